@@ -31,7 +31,7 @@ constexpr float kTouch = 0.0003f;       // [m] by which the sides of a slit in s
 constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of each end: inverted edges make it shorter
 constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
-constexpr int kThrows = 2;
+constexpr int kThrows = 2, kSurgeonsThrows = 3;
 constexpr int kFirstWraps = 2;     // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
 constexpr int kRingThrows = 5;     // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops are 0.2 mm wider
@@ -355,8 +355,9 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
   plan.approximate = kApproximate;
   plan.task.pop_back();
   add(plan, TaskKind::approximate);
-  // The first two throws make the knot that the load locks. The hands hold it tight until the clamps have put the load on it.
-  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, i == 0 ? kFirstWraps : 1, 1, i == 1});
+  // 2-1-1. The hands hold the last throw tight until the clamps have put the load on the knot.
+  for (int i = 0; i < kSurgeonsThrows; ++i)
+    plan.task.push_back({TaskKind::throw_, i == 0 ? kFirstWraps : 1, 1, i + 1 == kSurgeonsThrows});
   add(plan, TaskKind::cut_tail);
   add(plan, TaskKind::cut_long);
   add(plan, TaskKind::leave);
@@ -367,8 +368,6 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
 Plan skin_tied_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_tied_plan(picture, skill);
   plan.flat = true;
-  for (Task& t : plan.task)
-    if (t.kind == TaskKind::throw_ && !t.release) t.which = 2;
   plan.approximate = 0.5f * distance(opening_shape(picture, 0).center, opening_shape(picture, 1).center) + kTouch;
   return plan;
 }

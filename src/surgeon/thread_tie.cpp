@@ -22,21 +22,21 @@ constexpr float kSteepOnFlat = 3;  // the same on flat tissue: a jaw beside the 
 constexpr float kLeans = 60;       // [1/m] of the shaft toward a tail that lies on a slope in front or behind
 constexpr float kTurns = 3;        // [1/s]
 constexpr float kTurnLeft =
-    2 * kPi - 2;                         // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
-constexpr float kShaft = 2.2e-3f;        // [m] radius that the turns lie on
-constexpr float kJawsRound = 1.7e-3f;    // [m] the same of two turns, which take up no more than they must: round the jaws
-constexpr float kNearest = 9e-3f;        // [m] of the winding hand from the shaft
-constexpr float kLoose = 0.95f;          // of the strand that is left: nearly taut
-constexpr float kWinding = 0.25f;        // [N] above which the winding hand yields
-constexpr float kTailEnd = 6e-3f;        // [m] from the tail's end, where it is taken
-constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the line midway between the jaws: they close on the tail there
-constexpr float kJaws = 3e-3f;           // [m] of their length, that a tail is taken with
-constexpr float kBite = 5e-3f;           // [m] of their length, that thread is held by
-constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
-constexpr float kPinched = 0.8e-3f;      // [m] from there, a strand is held with the tail: a turn on the jaws is farther away
-constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
-constexpr float kPatience = 2;           // [s]; then they close where they are
-constexpr float kAhead = 4e-3f;          // [m] of the hand before the jaws, at most
+    2 * kPi - 2;                       // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
+constexpr float kShaft = 2.2e-3f;      // [m] radius that the turns lie on
+constexpr float kJawsRound = 1.7e-3f;  // [m] the same of two turns, which take up no more than they must: round the jaws
+constexpr float kNearest = 9e-3f;      // [m] of the winding hand from the shaft
+constexpr float kLoose = 0.95f;        // of the strand that is left: nearly taut
+constexpr float kWinding = 0.25f;      // [N] above which the winding hand yields
+constexpr float kTailEnd = 6e-3f, kNearer = 2e-3f;  // [m] from the tail's end, where it is taken; more after each miss
+constexpr float kBetweenJaws = 0.6e-3f;             // [m] from the line midway between the jaws: they close on the tail there
+constexpr float kJaws = 3e-3f;                      // [m] of their length, that a tail is taken with
+constexpr float kBite = 5e-3f;                      // [m] of their length, that thread is held by
+constexpr float kHeldWell = 1.5e-3f;  // [m] the same of a tail that turns slide over; between jaws and tail they come off
+constexpr float kPinched = 0.8e-3f;   // [m] from there, a strand is held with the tail: a turn on the jaws is farther away
+constexpr float kBeside = 4e-3f;      // [m] of tail, on either side of the jaws
+constexpr float kPatience = 2;        // [s]; then they close where they are
+constexpr float kAhead = 4e-3f;       // [m] of the hand before the jaws, at most
 // The same in a lumen: a wall or a finished stitch in the way bears 2.4 N.
 constexpr float kGentle = 0.8e-3f;
 constexpr float kNearTail = 20e-3f;  // [m] from the tail: a hand nearer than that is gentle
@@ -77,9 +77,11 @@ constexpr float kBears = 3;           // [N] on a bite, above which the hands gi
 constexpr float kOverDrape = 12e-3f;  // [m] of the swage: the needle, which hangs down from the forceps, would scrape on it
 constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open jaws have none of it between them
 constexpr float kStrandRoom = 2e-3f;  // [m] the same from another stitch's thread
-constexpr float kCaught = 1.5f, kCaughtFor = 0.2f;  // [N] on the hand more than the tail's tension, [s]
-constexpr float kForeign = 1;                       // [N] more than a finished stitch bears while another is tied
-constexpr float kFarthest = 9e-3f;                  // [m] of the place where a tail is taken, beyond kTailEnd
+constexpr float kCaught = 1.5f, kCaughtFor = 0.2f;     // [N] on the hand more than the tail's tension, [s]
+constexpr float kForeign = 1;                          // [N] more than a finished stitch bears while another is tied
+constexpr float kStandsOn = 2;                         // [N] on jaws that have not reached the tail: a wall bears them
+constexpr float kRises = 8e-3f, kNearlyThere = 2e-3f;  // [m] by which they rise then, and from where they go down again
+constexpr float kFarthest = 9e-3f;                     // [m] of the place where a tail is taken, beyond kTailEnd
 
 SeenThrows look(const Snapshot& seen) {
   std::vector<Vec3> thread;
@@ -143,6 +145,8 @@ float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
   }
   return best;
 }
+
+float ThreadTie::held_tail() const { return tail_ - kTailEnd - kNearer * static_cast<float>(misses_); }
 
 // [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
 // not count.
@@ -301,7 +305,7 @@ Vec3 ThreadTie::give(Vec3 at, float felt, float& given, float dt) const {
 }
 
 void ThreadTie::go(const Snapshot& seen, Stage stage) {
-  stage_ = stage, waited_ = 0, tail_given_ = strand_given_ = 0;
+  stage_ = stage, waited_ = risen_ = caught_ = 0, tail_given_ = strand_given_ = 0;
   const Vec3 shaft = shaft_from(side_);
   const Vec3 work = origin_ + around(side_, 0.5f * kPi, shaft) * height_ - shaft * kStrandAt;
   const Vec3 aside = origin_ + Vec3{side_ * 0.28f, 0.50f, -0.72f} * strand_;  // of the strand: behind the work
@@ -364,14 +368,16 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       tip_from_ = tip_, tip_to_ = origin_ + normalized(out) * std::min(length(out), kReach * (tail_ - kTailEnd));
       break;
     }
+    // The tail stays slack, and is drawn in by the pull. Taut beside a slack strand, it would draw it into the loop below the
+    // knot.
     case cross_up:
-      glide_to(origin_ + line_ * (side_ * 0.6f * tail_) + Vec3{0, 8e-3f + kLow, 0},
+      glide_to(origin_ + line_ * (side_ * 0.6f * held_tail()) + Vec3{0, 8e-3f + kLow, 0},
                origin_ - line_ * (side_ * std::min(24e-3f, 0.5f * strand_)) + Vec3{0, 12e-3f + kLow, 0}, 0.6f * how_.speed,
                forceps_angle_);
       break;
     case cross_down:
-      glide_to(origin_ + line_ * (side_ * 0.75f * tail_) + Vec3{0, 2e-3f + kLow, 0},
-               origin_ - line_ * (side_ * 0.6f * strand_) + Vec3{0, 4e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
+      glide_to(origin_ + line_ * (side_ * 0.75f * held_tail()) + Vec3{0, 2e-3f + kLow, 0},
+               origin_ - line_ * (side_ * 0.85f * strand_) + Vec3{0, 4e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
       break;
     case pull:
       steady_ = caught_ = 0;
@@ -479,14 +485,19 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     case fetch: {
       // By sight of the jaws, which lag behind the hand.
-      const float place = tail_place(seen, kTailEnd + 2e-3f * static_cast<float>(misses_));
+      const float place = tail_place(seen, kTailEnd + kNearer * static_cast<float>(misses_));
       // Not down into a lumen before the shaft stands as it shall.
       const bool stands = !how_.lumen || dot(shaft_, approach_) > kStands;
-      const Vec3 goal = tail_node(seen, place) + (stands ? Vec3{} : approach_ * kAbove), jaws = seen.tool[kHolder].pose.p;
+      const Vec3 goal = tail_node(seen, place) + (stands ? Vec3{} : approach_ * kAbove) + shaft_ * risen_,
+                 jaws = seen.tool[kHolder].pose.p;
       const Vec3 way = from_jaws(seen.tool[kHolder], goal, kJaws);
       const float left = length(way),
                   speed = std::min(0.7f * how_.speed, 0.01f + 4 * left) * (felt_ > 2 * kWinding ? 0.3f : 1.0f);
       tip_ += way * (std::min(speed * dt, left) / std::max(left, 1e-6f));
+      // A jaw that stands on the wall beside the tail would plough both away: up once, and down again nearer to the knot.
+      if (risen_ > 0 && left < kNearlyThere) risen_ = 0;
+      caught_ = risen_ == 0 && length(seen.tool[kHolder].force) > kStandsOn ? caught_ + dt : 0;
+      if (caught_ > kCaughtFor && left > kBetweenJaws && misses_ == 0) ++misses_, risen_ = kRises, waited_ = caught_ = 0;
       // Steeper, and turned until the tail passes between the jaws.
       shaft_ = normalized(lerp(shaft_, approach_, std::min(1.0f, kTurns * dt)));
       const Vec3 along = tail_node(seen, place + kBeside) - tail_node(seen, place - kBeside);

@@ -79,6 +79,7 @@ class ThreadTie {
   float slack_of(const Snapshot& seen, bool tail) const;
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
   float tail_place(const Snapshot& seen, float wanted) const;
+  float held_tail() const;  // [m] of it from the jaws to the knot
   // Winds again, after the stage that lets everything go; or fails.
   void again(const Snapshot& seen, Stage after);
   void measure(const Snapshot& seen);
@@ -114,7 +115,7 @@ class ThreadTie {
   float angle_from_ = 0, angle_to_ = 0, done_ = 0, seconds_ = 0;
   // Winding.
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
-  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0, caught_ = 0;
+  float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0, caught_ = 0, risen_ = 0;
   float tail_given_ = 0, strand_given_ = 0;  // [m] by which the hands have given way
 };
 
