@@ -368,8 +368,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       tip_from_ = tip_, tip_to_ = origin_ + normalized(out) * std::min(length(out), kReach * (tail_ - kTailEnd));
       break;
     }
-    // The tail stays slack, and is drawn in by the pull. Taut beside a slack strand, it would draw it into the loop below the
-    // knot.
+    // The strand first. A taut tail beside a slack strand would draw that into the loop below the knot.
     case cross_up:
       glide_to(origin_ + line_ * (side_ * 0.6f * held_tail()) + Vec3{0, 8e-3f + kLow, 0},
                origin_ - line_ * (side_ * std::min(24e-3f, 0.5f * strand_)) + Vec3{0, 12e-3f + kLow, 0}, 0.6f * how_.speed,
@@ -380,7 +379,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
                origin_ - line_ * (side_ * 0.85f * strand_) + Vec3{0, 4e-3f + kLow, 0}, 0.6f * how_.speed, forceps_angle_);
       break;
     case pull:
-      steady_ = caught_ = 0;
+      steady_ = 0;
       break;
     case lay:
       pulled_ = std::min(felt_, tail_felt_);

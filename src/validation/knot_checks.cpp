@@ -60,79 +60,70 @@ double capstan_exponent(float degrees, float mu, float load, bool drawn, float s
   return std::log(sum / slide / double{weight}) / double{mu * angle} * (drawn ? 1 : -1);
 }
 
-// Thread drawn over a straight, fixed thread by half a turn, segments of `coarse` diameters: there only two to four contacts
-// bear the load. Returns the exponent as above.
+// Thread over a straight, fixed thread along z, whose end at `curve`'s beginning is drawn along `way` against `weight` [N]
+// along `down` at the other one. Returns the mean force [N] at the drawn end, from `slide` to `slide` + `count` [ms] of
+// drawing.
+double draw_over_thread(Settings settings, const std::vector<Vec3>& curve, float coarse, Vec3 way, float speed, Vec3 down,
+                        float weight, int slide, int count) {
+  settings.damping = 0;
+  const float l = coarse * settings.material.diameter;
+  const uint32_t bar = 41;
+  std::vector<Vec3> path;
+  for (uint32_t i = 0; i < bar; ++i) path.push_back({0, 0, l * (static_cast<float>(i) - 19.63f)});
+  for (const Vec3& p : resample(curve, l)) path.push_back(p);
+  State state = thread::make_state(path);
+  state.broken[bar - 1] = 1;
+  Stepper stepper(path.size());
+  std::vector<Hold> hold(bar + 1);  // of the bar; of the drawn end
+  for (uint32_t i = 0; i <= bar; ++i) hold[i].node = i, hold[i].from = hold[i].to = path[i];
+  const Pull pull{static_cast<uint32_t>(path.size()) - 1, down * weight};
+  Surroundings around;
+  around.holds = hold, around.pulls = {&pull, 1};
+  const int rest = 100;
+  double sum = 0;
+  for (int i = 0; i < rest + slide + count; ++i) {
+    hold[bar].from = hold[bar].to;
+    if (i >= rest) hold[bar].to += way * (1e-3f * speed);
+    stepper.step(settings, state, around);
+    if (i >= rest + slide) sum += double{length(hold[bar].force)};
+  }
+  return sum / count;
+}
+
+// By half a turn, segments of `coarse` diameters: there only two to four contacts bear the load. Returns the exponent as above.
 double over_thread_exponent(float coarse, float mu) {
   Settings settings = knot_settings(mu);
   settings.material.friction_load = 0;
   settings.material.bending_stiffness = 1e-9f;
-  settings.damping = 0;
-  const float d = settings.material.diameter, l = coarse * d;
-  std::vector<Vec3> path, fine;
-  const uint32_t bar = 41;
-  for (uint32_t i = 0; i < bar; ++i) path.push_back({0, 0, l * (static_cast<float>(i) - 19.63f)});
-  for (int i = 0; i < 2000; ++i) fine.push_back({d, -15e-3f * (1 - static_cast<float>(i) / 2000), 0});
+  const float d = settings.material.diameter;
+  std::vector<Vec3> curve;
+  for (int i = 0; i < 2000; ++i) curve.push_back({d, -15e-3f * (1 - static_cast<float>(i) / 2000), 0});
   for (int i = 0; i < 2000; ++i) {
     const float a = kPi * static_cast<float>(i) / 2000;
-    fine.push_back({d * std::cos(a), d * std::sin(a), 0});
+    curve.push_back({d * std::cos(a), d * std::sin(a), 0});
   }
-  for (int i = 0; i < 2000; ++i) fine.push_back({-d, -25e-3f * static_cast<float>(i) / 2000, 0});
-  for (const Vec3& p : resample(fine, l)) path.push_back(p);
-  State state = thread::make_state(path);
-  state.broken[bar - 1] = 1;
-  Stepper stepper(path.size());
-  std::vector<Hold> hold(bar + 1);  // of the bar; of the drawn end
-  for (uint32_t i = 0; i <= bar; ++i) hold[i].node = i, hold[i].from = hold[i].to = path[i];
+  for (int i = 0; i < 2000; ++i) curve.push_back({-d, -25e-3f * static_cast<float>(i) / 2000, 0});
   const float weight = 2 * std::exp(-mu * kPi);
-  const Pull pull{static_cast<uint32_t>(path.size()) - 1, {0, -weight, 0}};
-  Surroundings around;
-  around.holds = hold, around.pulls = {&pull, 1};
-  double sum = 0;
-  for (int i = 0; i < 600; ++i) {
-    hold[bar].from = hold[bar].to;
-    if (i >= 100) hold[bar].to.y -= 2e-5f;
-    stepper.step(settings, state, around);
-    if (i >= 250) sum += double{length(hold[bar].force)};
-  }
-  return std::log(sum / 350 / double{weight}) / double{mu * kPi};
+  const Vec3 down{0, -1, 0};
+  return std::log(draw_over_thread(settings, curve, coarse, down, 20e-3f, down, weight, 150, 350) / double{weight}) /
+         double{mu * kPi};
 }
 
-// Thread bent by 60 degrees over a straight, fixed thread and drawn at 5 mm/s against `weight` [N]. Returns friction over
-// mu N (0.3 N / N)^(1/8), where N bears the two tensions.
+// By 60 degrees, at 5 mm/s. Returns friction over mu N (0.3 N / N)^(1/8), where N bears the two tensions.
 double power_law_ratio(float weight) {
-  constexpr float kMu = 0.3f, kAngle = kPi / 3, kSpeed = 5e-3f;
+  constexpr float kMu = 0.3f, kAngle = kPi / 3;
   Settings settings = knot_settings(kMu);
   settings.material.bending_stiffness = 1e-11f, settings.material.elastic_curvature = 0;
-  settings.damping = 0;
-  const float d = settings.material.diameter, l = 1.43f * d, sine = std::sin(kAngle / 2), cosine = std::cos(kAngle / 2);
+  const float d = settings.material.diameter, sine = std::sin(kAngle / 2), cosine = std::cos(kAngle / 2);
   const Vec3 top{0, d / cosine, 0}, right{cosine, -sine, 0}, left{-cosine, -sine, 0};
-  const uint32_t bar = 41;
-  std::vector<Vec3> path, fine;
-  for (uint32_t i = 0; i < bar; ++i) path.push_back({0, 0, l * (static_cast<float>(i) - 19.63f)});
-  for (int i = 0; i < 2000; ++i) fine.push_back(top + right * (15e-3f * (1 - static_cast<float>(i) / 2000)));
-  for (int i = 0; i <= 2000; ++i) fine.push_back(top + left * (25e-3f * static_cast<float>(i) / 2000));
-  for (const Vec3& p : resample(fine, l)) path.push_back(p);
-  State state = thread::make_state(path);
-  state.broken[bar - 1] = 1;
-  Stepper stepper(path.size());
-  std::vector<Hold> hold(bar + 1);  // of the bar; of the drawn end
-  for (uint32_t i = 0; i <= bar; ++i) hold[i].node = i, hold[i].from = hold[i].to = path[i];
-  const Pull pull{static_cast<uint32_t>(path.size()) - 1, left * weight};
-  Surroundings around;
-  around.holds = hold, around.pulls = {&pull, 1};
-  // It slides all round after 1 mm. Then six nodes pass the bar.
-  const int rest = 100, slide = static_cast<int>(1 / kSpeed), count = static_cast<int>(6000 * l / kSpeed);
-  double taut = 0;
-  for (int i = 0; i < rest + slide + count; ++i) {
-    hold[bar].from = hold[bar].to;
-    if (i >= rest) hold[bar].to += right * (1e-3f * kSpeed);
-    stepper.step(settings, state, around);
-    if (i >= rest + slide) taut += double{length(hold[bar].force)} / count;
-  }
+  std::vector<Vec3> curve;
+  for (int i = 0; i < 2000; ++i) curve.push_back(top + right * (15e-3f * (1 - static_cast<float>(i) / 2000)));
+  for (int i = 0; i <= 2000; ++i) curve.push_back(top + left * (25e-3f * static_cast<float>(i) / 2000));
+  // It slides all round after 1 mm. Then six nodes of 1.43 diameters pass the bar.
+  const double taut = draw_over_thread(settings, curve, 1.43f, right, 5e-3f, left, weight, 200, 600), slack = double{weight};
   // The normal forces of the arc add up to angle T, their vector sum N is 2 sin(angle / 2) T.
-  const double slack = double{weight}, exponent = std::log(taut / slack);
   const double load = (taut + slack) * double{sine};
-  return exponent / (double{kMu * kAngle} * std::pow(0.3 / load, 0.125));
+  return std::log(taut / slack) / (double{kMu * kAngle} * std::pow(0.3 / load, 0.125));
 }
 
 std::string number(double v) {
