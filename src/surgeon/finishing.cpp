@@ -31,6 +31,8 @@ constexpr int kPiece = 10;               // first stage of carrying a cut-off ta
 constexpr int kPieceMisses = 3;          // then it is left where it fell
 constexpr float kPieceLoad = 1;  // [N] by which a stitch's thread becomes tauter while a loose piece is lifted: it is held too
 constexpr float kPieceGrip = 0.008f;          // [m] of the jaws from where it was cut
+constexpr float kNearTips = 1.5e-3f;          // [m] from the middle of the jaws, where they take it
+constexpr float kStandsOn = 1.5f;             // [N] on jaws that come down
 constexpr float kPieceUp = 0.06f;             // [m] it is raised: longer than it is
 constexpr Vec3 kPieceAside{0.09f, 0, 0.07f};  // [m] from the center of the field, where it is laid down
 
@@ -201,9 +203,14 @@ bool Scripted::take_piece(const Snapshot& seen) {
   if (misses_ > kPieceMisses || end >= cut.size()) return true;                                // it lies where it fell
   if (stage_ == over && waited_ <= dt_) cut_at_ = piece_grip(seen, end);
   const size_t at = cut_at_;
+  // Square to the wall that it lies on: the other jaw would meet it first.
+  if (stage_ == over && waited_ <= dt_) {
+    const Vec3 from[] = {wall_normal(picture_, seen, node_at(seen, at)), kCutFrom, {0, 1, 0}};
+    piece_from_ = from[clear_shaft(picture_, seen, node_at(seen, at), from)];
+  }
   const Vec3 x =
-      normalized(cross(kCutFrom, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
-  const Pose goal{node_at(seen, at), from_axes(x, cross(kCutFrom, x), kCutFrom)};
+      normalized(cross(piece_from_, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
+  const Pose goal{node_at(seen, at) + piece_from_ * kNearTips, from_axes(x, cross(piece_from_, x), piece_from_)};
   const Vec3 place{picture_.focus.x + kPieceAside.x, picture_.drape + kOverDrape, picture_.focus.z + kPieceAside.z};
   const auto missed = [&] { ++retries_, ++misses_, go(let_go); };
   switch (stage_) {
@@ -211,8 +218,8 @@ bool Scripted::take_piece(const Snapshot& seen) {
       jaw(kNeedleHolder, kHalfOpen);
       if (move(kNeedleHolder, raised(goal, 0.015f), skill_.speed) || !patience(4)) go(down);
       return false;
-    case down:
-      if (move(kNeedleHolder, goal, careful()) || !patience(3)) go(close);
+    case down:  // until they stand on a wall: pressed farther, it is pushed away under its stitch
+      if (move(kNeedleHolder, goal, careful()) || length(seen.tool[kNeedleHolder].force) > kStandsOn || !patience(3)) go(close);
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;

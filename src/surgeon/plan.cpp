@@ -17,7 +17,7 @@ constexpr int kBitesPerThread = 10;
 constexpr float kRow = 0.004f;            // [m] between two rows of bites
 constexpr float kStaysApart = 0.012f;     // [m] round the bowel, between stay sutures
 constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
-constexpr float kPull = 1.7f;             // [N] on each strand of a physical throw: below what the bites bear
+constexpr float kPull = 2.2f;             // [N] on each strand of a physical throw: below what the bites bear
 // [N] the same for bites through half of the wall: both strands pull at each, and with 1.7 N one tore out.
 constexpr float kPullShallow = 0.9f;
 constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch after 1.5 mm
@@ -31,7 +31,7 @@ constexpr float kTouch = 0.0003f;       // [m] by which the sides of a slit in s
 constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of each end: inverted edges make it shorter
 constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
-constexpr int kThrows = 2, kSurgeonsThrows = 3;
+constexpr int kThrows = 3;
 constexpr int kFirstWraps = 2;     // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
 constexpr int kRingThrows = 5;     // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops are 0.2 mm wider
@@ -122,10 +122,10 @@ void add_bites(Plan& plan, int bites, bool held) {
   }
 }
 
-// A square knot of single throws while clamps hold the edges together, which go back in the last one; hands away.
+// 2-1-1 while clamps hold the edges together, which go back in the last throw: the hands hold it tight until the clamps have
+// put the load on the knot. Then hands away.
 void tie_and_leave(Plan& plan) {
-  add(plan, TaskKind::regrip);
-  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, 1, 1, i + 1 == kThrows});
+  for (int i = 0; i < kThrows; ++i) plan.task.push_back({TaskKind::throw_, i == 0 ? kFirstWraps : 1, 1, i + 1 == kThrows});
   add(plan, TaskKind::cut_tail);
   add(plan, TaskKind::cut_long);
   add(plan, TaskKind::leave);
@@ -345,6 +345,7 @@ Plan over_and_over_plan(const PictureModel& picture, const SurgeonSkill& skill) 
   plan.approximate = kApproximate;
   add(plan, TaskKind::approximate);
   add(plan, TaskKind::gather);
+  add(plan, TaskKind::regrip);
   tie_and_leave(plan);
   return plan;
 }
@@ -355,12 +356,7 @@ Plan interrupted_tied_plan(const PictureModel& picture, const SurgeonSkill& skil
   plan.approximate = kApproximate;
   plan.task.pop_back();
   add(plan, TaskKind::approximate);
-  // 2-1-1. The hands hold the last throw tight until the clamps have put the load on the knot.
-  for (int i = 0; i < kSurgeonsThrows; ++i)
-    plan.task.push_back({TaskKind::throw_, i == 0 ? kFirstWraps : 1, 1, i + 1 == kSurgeonsThrows});
-  add(plan, TaskKind::cut_tail);
-  add(plan, TaskKind::cut_long);
-  add(plan, TaskKind::leave);
+  tie_and_leave(plan);
   return plan;
 }
 
@@ -395,6 +391,7 @@ Plan lembert_thread_plan(const PictureModel& picture, const SurgeonSkill& skill)
   plan.approximate = kApproximate, plan.stay = kMobile;
   add(plan, TaskKind::approximate);
   if (skill.bites > 1) add(plan, TaskKind::gather);
+  add(plan, TaskKind::regrip);
   tie_and_leave(plan);
   return plan;
 }

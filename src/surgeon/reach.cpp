@@ -11,7 +11,8 @@ namespace {
 // Half the width of an instrument with open jaws: 3 mm at the tip, 6 mm at 50 mm from it. What it would push aside first lies
 // beyond the jaws, near which there is tissue in any direction.
 constexpr float kTipWidth = 3e-3f, kWidens = 0.06f, kBeyondJaws = 10e-3f, kShaftLength = 80e-3f;
-constexpr float kClear = 2e-3f;  // [m] of room that is enough
+constexpr float kClear = 2e-3f;      // [m] of room that is enough
+constexpr float kNeighbors = 6e-3f;  // [m]: their faces tell the slope of a wall
 // Thread nearer to an instrument's axis than this lies between its jaws: on them it is farther away. From the middle of the
 // jaws along the shaft: their tips, what is behind a needle in them, and more than they are long.
 constexpr float kBetween = 0.8e-3f, kTips = -2.5e-3f, kGrasp = 4e-3f, kLongest = 0.15f;
@@ -64,6 +65,16 @@ size_t clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal,
     if (room >= kClear) break;
   }
   return best;
+}
+
+Vec3 wall_normal(const PictureModel& picture, const Snapshot& seen, Vec3 p) {
+  Vec3 sum{};
+  for (size_t c = 0; c < picture.columns; ++c) {  // an outer and an inner particle each
+    const Vec3 outer = seen.particle[2 * c], inner = seen.particle[2 * c + 1], up = normalized(outer - inner);
+    const float side = dot(p - (outer + inner) * 0.5f, up) < 0 ? -1.0f : 1.0f;
+    sum += up * side * std::max(0.0f, 1 - length2((side > 0 ? outer : inner) - p) / (kNeighbors * kNeighbors));
+  }
+  return normalized(sum, {0, 1, 0});
 }
 
 bool catches_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool) {

@@ -16,6 +16,9 @@ float room_at(const PictureModel& picture, const Snapshot& seen, Vec3 p, bool wa
 // walls and of other stitches when its tip is at `goal`; if none is, of the one with most room.
 size_t clear_shaft(const PictureModel& picture, const Snapshot& seen, Vec3 goal, std::span<const Vec3> direction);
 
+// Unit: away from the walls within 6 mm of p, on the side of each where p is; the nearest count most. Up where there are none.
+Vec3 wall_normal(const PictureModel& picture, const Snapshot& seen, Vec3 p);
+
 // Thread lies between the closed jaws of an instrument, behind the needle that they hold: it would be pulled along.
 bool catches_thread(const PictureModel& picture, const Snapshot& seen, const ToolView& tool);
 // The same of another suture's thread, anywhere between jaws that hold thread of the active one.

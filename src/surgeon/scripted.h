@@ -235,7 +235,7 @@ class Scripted final : public Surgeon {
   size_t cuts_before_ = 0, cut_at_ = 0, settled_before_ = 0;  // cut_at_: node for the scissors, or for the jaws on a piece
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
-  Vec3 tried_;
+  Vec3 tried_, piece_from_;              // piece_from_: unit, from a piece of thread along the shaft of the jaws that take it
   std::optional<ThreadTie> thread_tie_;  // with physical mechanics, from the first throw on
   float clamped_ = 0;                    // [s] that both strands are still held taut, within a throw: the clamps move back
   int assisting_ = 0;  // stage of the assistant's hand at the crossing of a throw; 0: it waits beyond the field

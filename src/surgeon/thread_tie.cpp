@@ -17,9 +17,9 @@ namespace {
 constexpr size_t kHolder = 0, kForceps = 1;
 constexpr float kStrandAt = 18e-3f;  // [m] of the shaft, from the grasp point: above the wound
 constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
-constexpr float kSteepAtTail = 1;  // rise of the shaft at the tail, which lies along it: a turn between them would push it away
+constexpr float kSteepAtTail = 2;  // rise of the shaft at the tail, which lies along it: with 1 the jaws would lie on the wall
 constexpr float kSteepOnFlat = 3;  // the same on flat tissue: a jaw beside the tail, none under it
-constexpr float kLeans = 60;       // [1/m] of the shaft toward a tail that lies on a slope in front or behind
+constexpr float kMostLean = 0.8f;  // of the shaft to the front or back for its rise, square to the slope that the tail lies on
 constexpr float kTurns = 3;        // [1/s]
 constexpr float kTurnLeft =
     2 * kPi - 2;                       // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
@@ -30,7 +30,7 @@ constexpr float kLoose = 0.95f;        // of the strand that is left: nearly tau
 constexpr float kWinding = 0.25f;      // [N] above which the winding hand yields
 constexpr float kTailEnd = 6e-3f, kNearer = 2e-3f;  // [m] from the tail's end, where it is taken; more after each miss
 constexpr float kBetweenJaws = 0.6e-3f;             // [m] from the line midway between the jaws: they close on the tail there
-constexpr float kJaws = 3e-3f;                      // [m] of their length, that a tail is taken with
+constexpr float kJaws = 4.4e-3f;                    // [m] of their length, that a tail is taken with: all but the very tips
 constexpr float kBite = 5e-3f;                      // [m] of their length, that thread is held by
 constexpr float kHeldWell = 1.5e-3f;  // [m] the same of a tail that turns slide over; between jaws and tail they come off
 constexpr float kPinched = 0.8e-3f;   // [m] from there, a strand is held with the tail: a turn on the jaws is farther away
@@ -40,7 +40,7 @@ constexpr float kAhead = 4e-3f;       // [m] of the hand before the jaws, at mos
 // The same in a lumen: a wall or a finished stitch in the way bears 2.4 N.
 constexpr float kGentle = 0.8e-3f;
 constexpr float kNearTail = 20e-3f;  // [m] from the tail: a hand nearer than that is gentle
-constexpr float kStands = 0.985f;    // cosine of the shaft to the direction in which it goes down into a lumen
+constexpr float kStands = 0.985f;    // cosine of the shaft to the direction in which it goes down
 constexpr float kAbove = 15e-3f;     // [m] from the tail, until then
 constexpr float kHalfOpen = 0.8f;    // of the jaws, to take the tail
 constexpr float kNarrow = 0.5f;      // of the jaws with a turn on them: in a wider gap it falls between them, near the hinge
@@ -354,9 +354,11 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     case fetch: {  // across the slope that the tail lies on; steeper where walls or other stitches are in the way
       const Vec3 goal = tail_node(seen, tail_place(seen, kTailEnd));
-      const float lean = std::clamp(kLeans * (goal.z - origin_.z), -0.8f, 0.8f);
-      const Vec3 from[] = {normalized(Vec3{side_, kSteepAtTail, lean}), normalized(Vec3{side_, 2, lean}),
-                           normalized(Vec3{side_, kSteepOnFlat, lean}), normalized(Vec3{side_, kSteepOnFlat, -lean}),
+      const Vec3 out = wall_normal(picture_, seen, goal);
+      const float lean = std::clamp(out.z / std::max(out.y, 0.1f), -kMostLean, kMostLean);
+      const Vec3 from[] = {normalized(Vec3{side_, kSteepAtTail, kSteepAtTail * lean}),
+                           normalized(Vec3{side_, kSteepOnFlat, kSteepOnFlat * lean}),
+                           normalized(Vec3{side_, kSteepOnFlat, -kSteepOnFlat * lean}),
                            normalized(Vec3{0.5f * side_, kSteepOnFlat, 0})};
       approach_ = how_.flat ? normalized(Vec3{side_, kSteepOnFlat, 0}) : from[clear_shaft(picture_, seen, goal, from)];
       break;
@@ -485,8 +487,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case fetch: {
       // By sight of the jaws, which lag behind the hand.
       const float place = tail_place(seen, kTailEnd + kNearer * static_cast<float>(misses_));
-      // Not down into a lumen before the shaft stands as it shall.
-      const bool stands = !how_.lumen || dot(shaft_, approach_) > kStands;
+      // Not down before the shaft stands as it shall: a jaw would meet the wall, and the tail in a lumen has walls beside it.
+      const bool stands = dot(shaft_, approach_) > kStands;
       const Vec3 goal = tail_node(seen, place) + (stands ? Vec3{} : approach_ * kAbove) + shaft_ * risen_,
                  jaws = seen.tool[kHolder].pose.p;
       const Vec3 way = from_jaws(seen.tool[kHolder], goal, kJaws);

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 
 namespace catgut {
 namespace {
@@ -49,6 +50,24 @@ TEST(Reach, jaws_keep_clear_of_the_knot_of_another_stitch) {
   EXPECT_EQ(clear_shaft(f.picture, f.seen, {}, way), 1u);
   f.move_other(Vec3{0, 1, 0});
   EXPECT_EQ(clear_shaft(f.picture, f.seen, {}, way), 0u);
+}
+
+TEST(Reach, the_normal_of_a_wall_points_to_the_side_where_one_is) {
+  Field f;
+  f.seen.particle.clear();
+  for (int y = 0; y <= 20; ++y)
+    for (int i = 0; i < 60; ++i)
+      for (const float radius : {12e-3f, 10e-3f}) {
+        const float angle = 2 * kPi * static_cast<float>(i) / 60;
+        f.seen.particle.push_back({radius * std::cos(angle), -1e-3f * static_cast<float>(y), radius * std::sin(angle)});
+      }
+  f.picture.columns = static_cast<uint32_t>(f.seen.particle.size() / 2);
+  for (const float angle : {0.3f, 2.0f}) {
+    const Vec3 radial{std::cos(angle), 0, std::sin(angle)}, down{0, -10e-3f, 0};
+    EXPECT_GT(dot(wall_normal(f.picture, f.seen, radial * 12.5e-3f + down), radial), 0.98f);
+    EXPECT_LT(dot(wall_normal(f.picture, f.seen, radial * 9.5e-3f + down), radial), -0.98f) << "in the lumen";
+  }
+  EXPECT_EQ(wall_normal(f.picture, f.seen, {0, 0.1f, 0}).y, 1) << "none near";
 }
 
 TEST(Reach, where_nothing_is_clear_it_takes_the_direction_with_most_room) {

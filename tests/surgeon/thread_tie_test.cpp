@@ -213,6 +213,44 @@ TEST(ThreadTie, takes_a_tail_in_the_lumen_from_above) {
   EXPECT_LT(s.from_tail(), 1e-3f);
 }
 
+// A tail on the slope of a bowel that lies along x: one jaw met the wall before the other one reached the tail, and pressed on
+// it with 5 to 8 N.
+TEST(ThreadTie, comes_square_to_the_wall_that_a_tail_lies_on) {
+  for (const float aside : {-7e-3f, 4e-3f}) {  // [m] behind or before the ridge
+    SCOPED_TRACE(aside);
+    Stitch s;
+    constexpr float kRadius = 12e-3f;
+    std::vector<Vec3> wall;
+    for (int x = -60; x <= 60; x += 2)
+      for (int i = -8; i <= 8; ++i)
+        for (const float radius : {kRadius, kRadius - 2e-3f}) {
+          const float angle = 0.15f * static_cast<float>(i);
+          wall.push_back({1e-3f * static_cast<float>(x), radius * std::cos(angle) - kRadius, radius * std::sin(angle)});
+        }
+    s.picture.columns = static_cast<uint32_t>(wall.size() / 2);
+    const auto shift = static_cast<uint32_t>(wall.size());
+    for (uint32_t& slot : s.seen.active().thread_order) slot += shift;
+    for (SuturePointView& p : s.seen.active().suture_point) p.anchored += shift;
+    for (size_t i = 0; i < 30; ++i)  // the tail; the stitch is on the ridge
+      s.seen.particle[i] = {s.seen.particle[i].x, std::sqrt(kRadius * kRadius - aside * aside) - kRadius, aside};
+    wall.insert(wall.end(), s.seen.particle.begin(), s.seen.particle.end());
+    s.seen.particle = wall;
+    const Vec3 out = normalized(Vec3{0, std::sqrt(kRadius * kRadius - aside * aside), aside});
+
+    ThreadTie tie(s.picture, s.hands, {});
+    tie.begin(s.seen, 1, 1, true);
+    tie.begin(s.seen, 1, 1, false);
+    for (int i = 0; i < 2000 && tie.doing() != "close on the tail"; ++i) {
+      ASSERT_FALSE(tie.operate(s.seen, 1.0f / 60));
+      s.seen.tool[0].pose = s.hands[0].pose;
+    }
+    ASSERT_EQ(tie.doing(), "close on the tail");
+    const Pose& jaws = s.seen.tool[0].pose;
+    EXPECT_LT(std::abs(dot(rotate(jaws.q, {1, 0, 0}), out)), 0.1f) << "they open along the wall";
+    EXPECT_GT(dot(rotate(jaws.q, {0, 0, 1}), out), 0.8f) << "and do not lie on it";
+  }
+}
+
 // Jaws that something holds back: the hand's spring pulls by how far it is ahead of them.
 TEST(ThreadTie, presses_gently_on_what_lies_between_the_jaws_and_a_tail_in_the_lumen) {
   for (const char* stage : {"take the tail", "reach for the tail"}) {
