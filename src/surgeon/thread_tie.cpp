@@ -17,10 +17,8 @@ namespace {
 constexpr size_t kHolder = 0, kForceps = 1;
 constexpr float kStrandAt = 18e-3f;  // [m] of the shaft, from the grasp point: above the wound
 constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding hand, nearer the tip than the strand
-constexpr float kSteepAtTail = 2;  // rise of the shaft at the tail, which lies along it: with 1 the jaws would lie on the wall
-constexpr float kSteepOnFlat = 3;  // the same on flat tissue: a jaw beside the tail, none under it
-constexpr float kMostLean = 0.8f;  // of the shaft to the front or back for its rise, square to the slope that the tail lies on
-constexpr float kTurns = 3;        // [1/s]
+constexpr float kSteepOnFlat = 3;    // rise of the shaft at a tail on flat tissue: a jaw beside the tail, none under it
+constexpr float kTurns = 3;          // [1/s]
 constexpr float kTurnLeft =
     2 * kPi - 2;                       // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
 constexpr float kShaft = 2.2e-3f;      // [m] radius that the turns lie on
@@ -354,13 +352,10 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       break;
     case fetch: {  // across the slope that the tail lies on; steeper where walls or other stitches are in the way
       const Vec3 goal = tail_node(seen, tail_place(seen, kTailEnd));
-      const Vec3 out = wall_normal(picture_, seen, goal);
-      const float lean = std::clamp(out.z / std::max(out.y, 0.1f), -kMostLean, kMostLean);
-      const Vec3 from[] = {normalized(Vec3{side_, kSteepAtTail, kSteepAtTail * lean}),
-                           normalized(Vec3{side_, kSteepOnFlat, kSteepOnFlat * lean}),
-                           normalized(Vec3{side_, kSteepOnFlat, -kSteepOnFlat * lean}),
-                           normalized(Vec3{0.5f * side_, kSteepOnFlat, 0})};
-      approach_ = how_.flat ? normalized(Vec3{side_, kSteepOnFlat, 0}) : from[clear_shaft(picture_, seen, goal, from)];
+      const auto clear = [&](const auto& way) { return way[clear_shaft(picture_, seen, goal, way)]; };
+      approach_ = how_.flat    ? normalized(Vec3{side_, kSteepOnFlat, 0})
+                  : how_.lumen ? clear(ways_into_lumen(side_, goal.z - origin_.z))
+                               : clear(ways_to_tail(side_, wall_normal(picture_, seen, goal)));
       break;
     }
     case draw: {

@@ -2,6 +2,7 @@
 // surgeon/tie_geometry: directions and distances of an instrument tie, whose stitch is seen along x. For thread_tie.
 #pragma once
 #include <algorithm>
+#include <array>
 
 #include "core/elementary.h"
 #include "core/math.h"
@@ -20,6 +21,20 @@ inline Vec3 around(float side, float angle, Vec3 shaft) {
 inline Quat holder_turn(Vec3 z, Vec3 x = {0, 0, 1}) {
   x = normalized(x - z * dot(x, z));
   return from_axes(x, cross(z, x), z);
+}
+// Unit, from its tip to the hand, of a needle holder that comes for a tail on a wall with this normal; the first that is clear
+// is taken. Square to the wall, or one jaw meets it before the other one; and steep, or both lie on it beside the tail.
+inline std::array<Vec3, 4> ways_to_tail(float side, Vec3 normal) {
+  const float lean = std::clamp(normal.z / std::max(normal.y, 0.1f), -0.8f, 0.8f);
+  return {normalized(Vec3{side, 2, 2 * lean}), normalized(Vec3{side, 3, 3 * lean}), normalized(Vec3{side, 3, -3 * lean}),
+          normalized(Vec3{0.5f * side, 3, 0})};
+}
+// The same in a lumen, `aside` [m] nearer to the viewer than the stitch. Along the tail as far as walls allow: it hangs free
+// there, and steep jaws reach other stitches.
+inline std::array<Vec3, 5> ways_into_lumen(float side, float aside) {
+  const float lean = std::clamp(60 * aside, -0.8f, 0.8f);
+  return {normalized(Vec3{side, 1, lean}), normalized(Vec3{side, 2, lean}), normalized(Vec3{side, 3, lean}),
+          normalized(Vec3{side, 3, -lean}), normalized(Vec3{0.5f * side, 3, 0})};
 }
 // [m] to `p` from the nearest point midway between the jaws, whose middle `along` of length counts.
 inline Vec3 from_jaws(const ToolView& tool, Vec3 p, float along) {
