@@ -17,6 +17,8 @@ struct SeenThrows {
   // Hand of the next one, +1 right; `first`: hand of the knot's first throw.
   float next(float first) const;
 };
+// An end that has passed back through its own last throw makes another knot of the whole: then the throws below it are counted,
+// with up to 9 mm of either end left out.
 // The thread from end to end; whatever lies beyond (needle, hands) leads away from the knot. Some milliseconds: once or twice a
 // throw, not every tick.
 SeenThrows see_throws(std::span<const Vec3> thread);

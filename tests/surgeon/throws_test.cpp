@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <vector>
@@ -99,6 +100,18 @@ TEST(Throws, a_wide_throw_of_a_scene_is_counted) {
     for (const Vec3& p : thread) other.push_back(rotate(axis_angle(normalized(Vec3{1, 2, -1}), angle), p) * (0.5f + angle));
     expect_count(other, 1, 1, "turned and scaled");
   }
+}
+
+// A finished stitch of altemeier (seed 2): jaws that came for another tail have put its short end through its own last throw.
+// It holds, and was counted as no knot at all.
+TEST(Throws, below_an_end_that_passed_back_through_the_last_one_are_counted) {
+  std::ifstream in(std::string(CATGUT_SOURCE_DIR) + "/tests/surgeon/tangled_end.txt");
+  std::vector<Vec3> thread;
+  for (Vec3 p; in >> p.x >> p.y >> p.z;) thread.push_back(1e-3f * p);
+  ASSERT_EQ(thread.size(), 84u);
+  expect_count(thread, 2, 2, "four of its five throws");
+  std::reverse(thread.begin(), thread.end());
+  expect_count(thread, 2, 2, "from the other end");
 }
 
 TEST(Throws, the_next_one_has_the_other_hand) {
