@@ -32,7 +32,7 @@ constexpr int kPieceMisses = 3;          // then it is left where it fell
 constexpr float kPieceLoad = 1;  // [N] by which a stitch's thread becomes tauter while a loose piece is lifted: it is held too
 constexpr float kPieceGrip = 0.008f;          // [m] of the jaws from where it was cut
 constexpr float kNearTips = 1.5e-3f;          // [m] from the middle of the jaws, where they take it
-constexpr float kStandsOn = 1.5f;             // [N] on jaws that come down
+constexpr float kPieceStandsOn = 1.5f;        // [N] on jaws that come down for it
 constexpr float kPieceUp = 0.06f;             // [m] it is raised: longer than it is
 constexpr Vec3 kPieceAside{0.09f, 0, 0.07f};  // [m] from the center of the field, where it is laid down
 
@@ -201,13 +201,13 @@ bool Scripted::take_piece(const Snapshot& seen) {
   const auto& cut = seen.active().thread_cut;
   const size_t end = static_cast<size_t>(std::find(cut.begin(), cut.end(), 1) - cut.begin());  // of the tail's piece
   if (misses_ > kPieceMisses || end >= cut.size()) return true;                                // it lies where it fell
-  if (stage_ == over && waited_ <= dt_) cut_at_ = piece_grip(seen, end);
-  const size_t at = cut_at_;
-  // Square to the wall that it lies on: the other jaw would meet it first.
   if (stage_ == over && waited_ <= dt_) {
-    const Vec3 from[] = {wall_normal(picture_, seen, node_at(seen, at)), kCutFrom, {0, 1, 0}};
-    piece_from_ = from[clear_shaft(picture_, seen, node_at(seen, at), from)];
+    cut_at_ = piece_grip(seen, end);
+    // Square to the wall that it lies on: else one jaw stands on that before the other one is beside the thread.
+    const Vec3 place = node_at(seen, cut_at_), from[] = {wall_normal(picture_, seen, place), kCutFrom, {0, 1, 0}};
+    piece_from_ = from[clear_shaft(picture_, seen, place, from)];
   }
+  const size_t at = cut_at_;
   const Vec3 x =
       normalized(cross(piece_from_, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
   const Pose goal{node_at(seen, at) + piece_from_ * kNearTips, from_axes(x, cross(piece_from_, x), piece_from_)};
@@ -219,7 +219,8 @@ bool Scripted::take_piece(const Snapshot& seen) {
       if (move(kNeedleHolder, raised(goal, 0.015f), skill_.speed) || !patience(4)) go(down);
       return false;
     case down:  // until they stand on a wall: pressed farther, it is pushed away under its stitch
-      if (move(kNeedleHolder, goal, careful()) || length(seen.tool[kNeedleHolder].force) > kStandsOn || !patience(3)) go(close);
+      if (move(kNeedleHolder, goal, careful()) || length(seen.tool[kNeedleHolder].force) > kPieceStandsOn || !patience(3))
+        go(close);
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;

@@ -102,8 +102,8 @@ TEST(Throws, a_wide_throw_of_a_scene_is_counted) {
   }
 }
 
-// A finished stitch of altemeier (seed 2): jaws that came for another tail have put its short end through its own last throw.
-// It holds, and was counted as no knot at all.
+// A finished stitch of altemeier (seed 2, commit 7ff8759, 420 s), which had shown five throws until then: jaws that came for
+// another tail have put its short end through its own last throw. It holds, and was counted as no knot at all.
 TEST(Throws, below_an_end_that_passed_back_through_the_last_one_are_counted) {
   std::ifstream in(std::string(CATGUT_SOURCE_DIR) + "/tests/surgeon/tangled_end.txt");
   std::vector<Vec3> thread;
