@@ -306,15 +306,15 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   if (kind == TaskKind::pull_tail) {
     slack = length_between(seen, 0, first_point_node(seen)) - skill_.tail;
   } else if (kind == TaskKind::pull_slack) {
-    // In the last span from one bite to the next, or from one bowel end to the other: length of thread minus distance.
-    int spans = bite().walls;
+    // In the last span from one bite to the next, or from one bowel end to the other: length of thread minus distance. With
+    // physical mechanics in all spans that this bite has made: a sweep passes several walls, or one of them twice.
     for (size_t k = n - 1; k-- > 0;) {
+      if (plan_.pull > 0 && k + 1 < points_before_) break;
       const SuturePointView &a = seen.active().suture_point[k], &b = seen.active().suture_point[k + 1];
       if (a.bite == b.bite || (plan_.lift == 0 && plan_.pull <= 0 && a.wall == b.wall)) continue;
       slack += length_between(seen, node_of(seen, a.anchored), node_of(seen, b.anchored)) -
                1.1f * distance(a.position, b.position) - 0.001f;
-      // With physical mechanics a sweep through several walls leaves as many spans.
-      if (--spans <= 0 || plan_.pull <= 0) break;
+      if (plan_.pull <= 0) break;
     }
   } else if (kind == TaskKind::pull_together) {
     slack = open_seam(seen);

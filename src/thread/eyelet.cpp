@@ -122,6 +122,26 @@ void measure(const State& state, const Scratch& s, const SoftPoints& soft, size_
   c.length_out = c.near_out ? dot(out, c.out) : length(out);
 }
 
+// Thread that is pushed through the hole leaves it with all of the push: friction drives nothing.
+float passed(const Scratch& s, const Eyelet& eyelet) {
+  return s.lambda[eyelet.segment] > 0 ? 1.0f : portable::exp(eyelet.friction * eyelet.angle * eyelet.slip / kBristle);
+}
+
+// Between two holes that are nearer to each other than its diameter, thread does not turn to and fro as the node does that
+// waits there. Both share the turn from before the first hole to behind the second.
+void share_turns(const Settings& settings, State& state, Scratch& s, const SoftPoints& soft) {
+  for (size_t e = 0; e + 1 < state.eyelet.size(); ++e) {
+    Eyelet &a = state.eyelet[e], &b = state.eyelet[e + 1];
+    if (a.segment + 1 != b.segment) continue;
+    const float apart = distance(soft.at[a.point] + s.soft_moved.at(a.point), soft.at[b.point] + s.soft_moved.at(b.point));
+    const float part = clamp01(2 - 2 * apart / settings.material.diameter);
+    if (part <= 0) continue;
+    const float half = 0.5f * portable::acos(std::clamp(dot(s.corner[e].in, s.corner[e + 1].out), -1.0f, 1.0f));
+    a.angle += part * (half - a.angle), b.angle += part * (half - b.angle);
+    s.corner[e].pass = passed(s, a), s.corner[e + 1].pass = passed(s, b);
+  }
+}
+
 // A node has come through the hole: its overshoot and its motion turn into the other span, and the hole takes the kick. A node
 // of slack thread passes beside the hole. The segment to the next node keeps the length that it had round the corner.
 void pass_node(State& state, Scratch& s, SoftPoints& soft, uint32_t point, size_t node, size_t next, Vec3 from, Vec3 to,
@@ -193,8 +213,7 @@ void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundin
     eyelet.slip = std::clamp(eyelet.slip - (inside - eyelet.before), -kBristle, kBristle);
     eyelet.before = inside;
     eyelet.angle = portable::acos(std::clamp(dot(c.in, c.out), -1.0f, 1.0f));
-    // Thread that is pushed through the hole leaves it with all of the push: friction drives nothing.
-    c.pass = s.lambda[k] > 0 ? 1.0f : portable::exp(eyelet.friction * eyelet.angle * eyelet.slip / kBristle);
+    c.pass = passed(s, eyelet);
     const bool free_behind = e + 1 == state.eyelet.size() || state.eyelet[e + 1].segment != k + 1;
     const bool free_before = kept == 0 || state.eyelet[kept - 1].segment + 1 != k;
     if (c.near_out && c.length_out < 0 && free_behind) {
@@ -213,6 +232,7 @@ void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundin
     ++kept;
   }
   state.eyelet.resize(kept), s.corner.resize(kept);
+  share_turns(settings, state, s, soft);
 }
 
 void grip_corners(const Settings& settings, const State& state, Scratch& s, SoftPoints& soft) {

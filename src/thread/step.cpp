@@ -266,7 +266,7 @@ Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_un
   s.active_memory.resize(max_crossings), s.touched.assign(max_nodes + 8, 0);
   s.new_key.reserve(max_crossings), s.new_budget.reserve(max_crossings), s.new_crossing.reserve(max_crossings);
   s.block_middle.resize(max_nodes / 8 + 2), s.block_radius.resize(max_nodes / 8 + 2);
-  s.block_tools.resize(max_nodes / 8 + 2), s.near_block.resize(max_nodes / 8 + 2);
+  s.block_tools.resize(max_nodes / 8 + 2), s.near_block.resize(max_nodes / 8 + 2), s.holed.resize(max_nodes);
   s.tool_move.resize(2 * kMaxTools), s.pushed.resize(kMaxTools), s.body.reserve(kMaxTools);
   s.spike_right.resize(max_nodes), s.spike_left.resize(max_nodes);
   s.soft_moved.resize(kMaxSoftPoints), s.soft_before.resize(kMaxSoftPoints), s.soft_active.reserve(2 * kMaxSoftPoints);
