@@ -38,7 +38,7 @@ constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops ar
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
 constexpr float kYields = 0.002f;
-// The same between the two cut ends: with 2 mm their stitches gaped more when the bowel was pulled (docs/operation.md,
+// The same between the two cut ends: with 2 mm their stitches gaped more when the bowel was pulled (docs/operation_log.md,
 // Shallower bites).
 constexpr float kRingYields = 0.00075f;
 constexpr float kFreeDepth = 0.0045f;  // [m] depth below the rims of a sweep through two layers
