@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # The golden hashes for every compiler and architecture: GCC and Clang on x86-64, each with the kernels for AVX-512, AVX2 and
 # SSE4 (the last is all that the rest of the code uses), and AArch64, cross-built and run by qemu-user. Compares the bytes of the whole
-# state too, between the builds. Builds only the library, in build/determinism. Installs missing packages (Debian 12).
+# state too, between the builds. GCC's is that of build/, if there is one; the others are built in build/determinism, the library
+# alone. Installs missing packages (Debian 12).
 #   tools/check_determinism.sh [gcc] [clang] [aarch64]     default: all
 # CATGUT_GOLDEN_SECONDS (10): simulated seconds of each case on x86-64. CATGUT_GOLDEN_SECONDS_ARM (10): on AArch64, which the
 # emulator slows down about thirtyfold.
@@ -38,6 +39,11 @@ build() {  # build NAME CMAKE-OPTION...
     { grep -E -A 8 'error|FAILED' "$work/$name.log" | head -n 40; echo "check_determinism: $name cannot be built"; exit 2; }
 }
 
+built_by_gcc() {  # built_by_gcc FOLDER: a release build
+  grep -q '^CMAKE_BUILD_TYPE:.*=Release$' "$1/CMakeCache.txt" 2>/dev/null && [ -x "$1/tests/determinism/golden" ] &&
+    grep -qs 'CMAKE_CXX_COMPILER_ID "GNU"' "$1"/CMakeFiles/*/CMakeCXXCompiler.cmake
+}
+
 cases() { awk '!/^#/ { print $1, $2 }' "$root/tests/determinism/golden.txt" | uniq; }
 
 check() {  # check NAME SECONDS COMMAND...: every case against golden.txt, and the whole state against the first build's
@@ -64,8 +70,8 @@ whole_state() {  # whole_state NAME COMMAND...: hash_state after two seconds of 
   fi
 }
 
-x86() {  # x86 NAME
-  local simd golden="$work/$1/tests/determinism/golden"
+x86() {  # x86 NAME [BUILD]
+  local simd golden="${2:-$work/$1}/tests/determinism/golden"
   for simd in avx3 avx2 sse4; do
     if "$golden" print stay default --seconds 0.01 --simd $simd >/dev/null 2>"$work/simd.log"; then
       check "$1-$simd" "$seconds" "$golden" --simd $simd
@@ -79,7 +85,14 @@ x86() {  # x86 NAME
 mkdir -p "$work"
 for one in "${what[@]}"; do
   case "$one" in
-    gcc) build gcc -DCMAKE_CXX_COMPILER=g++ && x86 gcc ;;
+    gcc)
+      if built_by_gcc "$root/build"; then
+        cmake --build "$root/build" --target golden >"$work/gcc.log" 2>&1 || { tail -n 20 "$work/gcc.log"; exit 2; }
+        x86 gcc "$root/build"
+      else
+        build gcc -DCMAKE_CXX_COMPILER=g++ && x86 gcc
+      fi
+      ;;
     clang)
       install clang
       build clang -DCMAKE_CXX_COMPILER=clang++ && x86 clang

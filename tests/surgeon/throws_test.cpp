@@ -89,7 +89,7 @@ TEST(Throws, turns_that_the_tail_was_not_drawn_through_are_none) {
 // A thread of a scene (interrupted_tied, seed 1) at the moment when the hands have crossed: the second throw lies in a wide
 // loop.
 TEST(Throws, a_wide_throw_of_a_scene_is_counted) {
-  std::ifstream in(std::string(CATGUT_SOURCE_DIR) + "/tests/surgeon/wide_throw.txt");
+  std::ifstream in(CATGUT_SOURCE_DIR "/tests/surgeon/wide_throw.txt");
   std::vector<Vec3> thread;
   for (Vec3 p; in >> p.x >> p.y >> p.z;) thread.push_back(1e-3f * p);  // [mm] in the file
   ASSERT_EQ(thread.size(), 200u);
@@ -105,7 +105,7 @@ TEST(Throws, a_wide_throw_of_a_scene_is_counted) {
 // A finished stitch of altemeier (seed 2, commit 7ff8759, 420 s), which had shown five throws until then: jaws that came for
 // another tail have put its short end through its own last throw. It holds, and was counted as no knot at all.
 TEST(Throws, below_an_end_that_passed_back_through_the_last_one_are_counted) {
-  std::ifstream in(std::string(CATGUT_SOURCE_DIR) + "/tests/surgeon/tangled_end.txt");
+  std::ifstream in(CATGUT_SOURCE_DIR "/tests/surgeon/tangled_end.txt");
   std::vector<Vec3> thread;
   for (Vec3 p; in >> p.x >> p.y >> p.z;) thread.push_back(1e-3f * p);
   ASSERT_EQ(thread.size(), 84u);
