@@ -148,7 +148,7 @@ struct Scratch {
   Column block_radius;
   std::vector<std::array<uint64_t, kMaxTools / 64>> block_tools;
   std::vector<uint32_t> near_block;
-  std::vector<uint8_t> holed;   // 1: a hole is in the segment
+  std::vector<uint8_t> holed;   // 1: a hole is in this segment and in the next one
   std::vector<Vec3> tool_move;  // per substep, of both ends of every tool
   // Soft points: motion since the step began, now and at the beginning of the substep.
   Padded3 soft_moved, soft_before;

@@ -14,9 +14,10 @@ namespace catgut::thread {
 namespace {
 
 constexpr size_t kBlock = 8;  // segments that share a bounding sphere
-// Segments on either side of a hole, in addition to skipped_neighbors, that do not touch each other. A node waits beyond a hole
-// until the next hole lets it on: what is drawn from it to its neighbors there is not where the thread is.
-constexpr size_t kRoundHole = 3;
+// Segments round two holes in adjacent segments, in addition to skipped_neighbors, that do not touch each other. The node
+// between such holes waits beyond one until the other lets it on: what is drawn from it to its neighbors is not where the
+// thread is.
+constexpr size_t kRoundHoles = 3;
 
 CATGUT_CLONES void half_lengths(size_t segments, const float* __restrict x, const float* __restrict y,
                                 const float* __restrict z, float* __restrict half) {
@@ -85,10 +86,11 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       if (length2(off - along * clamp01(dot(off, along) / size2)) < r * r) s.block_tools[b][k / 64] |= uint64_t{1} << k % 64;
     }
   }
-  std::fill_n(s.holed.begin(), m, uint8_t{0});
-  for (const Eyelet& e : state.eyelet) s.holed[e.segment] = 1;
-  const auto round_hole = [&](size_t i, size_t j) {
-    return j <= i + skip + kRoundHole && std::find(&s.holed[i], &s.holed[j] + 1, 1) != &s.holed[j] + 1;
+  std::fill_n(s.holed.begin(), m, uint8_t{0});  // 1: a hole is in this segment and in the next one
+  for (size_t e = 0; e + 1 < state.eyelet.size(); ++e)
+    s.holed[state.eyelet[e].segment] = state.eyelet[e].segment + 1 == state.eyelet[e + 1].segment;
+  const auto round_holes = [&](size_t i, size_t j) {
+    return j <= i + skip + kRoundHoles && std::find(&s.holed[i], &s.holed[j], 1) != &s.holed[j];
   };
   uint8_t near[kBlock];
   size_t near_blocks = 0;
@@ -116,7 +118,7 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       std::memcpy(&left, near, sizeof left);
       for (; left != 0; left &= left - 1) {
         const size_t j = first + static_cast<size_t>(std::countr_zero(left)) / 8;
-        if (j <= i + skip || j >= m || state.broken[j] || round_hole(i, j)) continue;
+        if (j <= i + skip || j >= m || state.broken[j] || round_holes(i, j)) continue;
         const Vec3 p = between(state, i, j), c = s.e.at(j);
         float u, v;
         closest_points(p, a, c, u, v);

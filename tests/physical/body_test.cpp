@@ -378,7 +378,6 @@ TEST(Needle, makes_a_channel_in_each_of_two_walls_that_touch) {
 
 // A needle through two sheets that nearly touch; then it is drawn away, with 24 mm of thread. Between two
 // holes so near to each other lies a node that waits there. Where it counted as thread, one of these draws took 2.5 N.
-// Friction alone makes 0.6 N of most of them; one still takes 1.5.
 TEST(Needle, draws_its_thread_freely_through_two_walls_that_touch) {
   float most_of_all = 0;
   for (const float apart : {0.05e-3f, 0.1e-3f})
@@ -413,7 +412,7 @@ TEST(Needle, draws_its_thread_freely_through_two_walls_that_touch) {
           bench.step();
           for (size_t k = 0; k < bench.state.thread.segments(); ++k) most = std::max(most, bench.state.thread.tension[k]);
         }
-        EXPECT_LT(most, 2.0f) << apart << " m apart, " << segment << " m, toward " << way.x << " " << way.y;
+        EXPECT_LT(most, 1.0f) << apart << " m apart, " << segment << " m, toward " << way.x << " " << way.y;
         most_of_all = std::max(most_of_all, most);
       }
   std::printf("8 draws, tension up to %.2f N\n", static_cast<double>(most_of_all));
