@@ -80,13 +80,15 @@ Vec3 to_behind(const State& state, const Scratch& s, const SoftPoints& soft, siz
   return hole_from(state, s, soft, eyelet.point, eyelet.segment + 2) * -1.0f;
 }
 
+float apart(const Scratch& s, const SoftPoints& soft, const Eyelet& a, const Eyelet& b) {
+  return distance(soft.at[a.point] + s.soft_moved.at(a.point), soft.at[b.point] + s.soft_moved.at(b.point));
+}
+
 // The hole in the next segment that this one has met: the thread pushes both alike. None: itself.
 size_t met(const State& state, const Scratch& s, const SoftPoints& soft, size_t e) {
   const auto meets = [&](size_t a, size_t b) {
     return state.eyelet[a].segment + 1 == state.eyelet[b].segment &&
-           distance(soft.at[state.eyelet[a].point] + s.soft_moved.at(state.eyelet[a].point),
-                    soft.at[state.eyelet[b].point] + s.soft_moved.at(state.eyelet[b].point)) <
-               kMeet * state.rest[state.eyelet[b].segment];
+           apart(s, soft, state.eyelet[a], state.eyelet[b]) < kMeet * state.rest[state.eyelet[b].segment];
   };
   if (e + 1 < state.eyelet.size() && meets(e, e + 1)) return e + 1;
   return e > 0 && meets(e - 1, e) ? e - 1 : e;
@@ -133,8 +135,7 @@ void share_turns(const Settings& settings, State& state, Scratch& s, const SoftP
   for (size_t e = 0; e + 1 < state.eyelet.size(); ++e) {
     Eyelet &a = state.eyelet[e], &b = state.eyelet[e + 1];
     if (a.segment + 1 != b.segment) continue;
-    const float apart = distance(soft.at[a.point] + s.soft_moved.at(a.point), soft.at[b.point] + s.soft_moved.at(b.point));
-    const float part = clamp01(2 - 2 * apart / settings.material.diameter);
+    const float part = clamp01(2 - 2 * apart(s, soft, a, b) / settings.material.diameter);
     if (part <= 0) continue;
     const float half = 0.5f * portable::acos(std::clamp(dot(s.corner[e].in, s.corner[e + 1].out), -1.0f, 1.0f));
     a.angle += part * (half - a.angle), b.angle += part * (half - b.angle);

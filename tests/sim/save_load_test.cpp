@@ -204,7 +204,7 @@ TEST(SaveLoad, thread_that_falls_asleep_is_saved_at_any_tick) {
   TickInput rest;
   for (ToolInput& hand : rest.hand) hand.connected = 0;
   int before = 0, asleep = 0;
-  for (int t = 0; t < 60 * 60 && asleep == 0; ++t) {
+  for (int t = 0; t < 60 * 40 && asleep == 0; ++t) {
     TickInput input = t < 30 || hands.surgeon->done() ? rest : hands.surgeon->operate(seen, model->dt);
     input.tick = state->tick;
     const physical::Sleep& sleep = state->physical.world.sleep;
