@@ -317,26 +317,35 @@ TEST(Needle, enters_and_leaves_at_the_forces_of_the_law_and_the_thread_follows) 
   EXPECT_EQ(bench.state.needle[0].channels, 0u);
 }
 
+// Two sheets `apart`, and above them a needle at angle 0 with 160 nodes of thread, `segment` from each other. Returns the
+// center of its circle.
+Vec3 needle_over_two_sheets(Bench& bench, float apart, float segment) {
+  const float down = wall::SheetShape{}.thickness + apart;
+  put_two_sheets(bench, -down, [](const wall::SheetShape& shape, Vec3 p) {
+    return std::min({p.x, shape.width - p.x, p.y, shape.height - p.y}) < 1e-4f;
+  });
+  const uint32_t n = bench.add_needle({}, {});
+  const NeedleModel& needle = bench.model.needles.needle[0];
+  const Vec3 circle = kCircle - Vec3{0, 0, down};
+  place_body(bench.model.bodies.body[n], bench.body(n), on_circle(needle, circle, 0), 0);
+  const Vec3 swage = swage_of(needle, bench.body(n).pose), along = normalized(Vec3{0.48f, 0, 0.14f}) * segment;
+  std::vector<Vec3> path;
+  for (int i = 159; i >= 0; --i) path.push_back(swage + along * static_cast<float>(i));
+  bench.state.thread = thread::make_state(path);
+  bench.state.needle[0].thread_node = 159;
+  bench.start();
+  return circle;
+}
+
 // Two sheets one above the other, as near to each other as walls that touch. A tip that comes out of the upper one is on the
 // lower one at once, and makes a channel there as well. Thread follows through both, and nothing is jerked.
 TEST(Needle, makes_a_channel_in_each_of_two_walls_that_touch) {
   for (const float apart : {0.05e-3f, 0.4e-3f, 1.5e-3f}) {
     Bench bench;
-    const float down = wall::SheetShape{}.thickness + apart;
-    put_two_sheets(bench, -down, [](const wall::SheetShape& shape, Vec3 p) {
-      return std::min({p.x, shape.width - p.x, p.y, shape.height - p.y}) < 1e-4f;
-    });
-    const uint32_t n = bench.add_needle({}, {});
+    float angle = 0;
+    const Vec3 circle = needle_over_two_sheets(bench, apart, 0.5e-3f);
+    const uint32_t n = 0;
     const NeedleModel& needle = bench.model.needles.needle[0];
-    const Vec3 circle = kCircle - Vec3{0, 0, down};
-    float angle = 0;  // both ends of the needle above the sheets
-    place_body(bench.model.bodies.body[n], bench.body(n), on_circle(needle, circle, angle), 0);
-    const Vec3 swage = swage_of(needle, bench.body(n).pose);
-    std::vector<Vec3> path;
-    for (int i = 159; i >= 0; --i) path.push_back(swage + Vec3{0.48e-3f, 0, 0.14e-3f} * static_cast<float>(i));
-    bench.state.thread = thread::make_state(path);
-    bench.state.needle[0].thread_node = 159;
-    bench.start();
     std::vector<uint32_t> events;
     float tension = 0;  // [N] of the thread, most
     const auto drive = [&](float to, size_t until) {
@@ -384,21 +393,10 @@ TEST(Needle, draws_its_thread_freely_through_two_walls_that_touch) {
     for (const float segment : {0.5e-3f, 0.7e-3f})
       for (const Vec3 way : {Vec3{0, 0, -1}, Vec3{0.3f, 1, -0.5f}}) {
         Bench bench;
-        const float down = wall::SheetShape{}.thickness + apart;
-        put_two_sheets(bench, -down, [](const wall::SheetShape& shape, Vec3 p) {
-          return std::min({p.x, shape.width - p.x, p.y, shape.height - p.y}) < 1e-4f;
-        });
-        const uint32_t n = bench.add_needle({}, {});
-        const NeedleModel& needle = bench.model.needles.needle[0];
-        const Vec3 circle = kCircle - Vec3{0, 0, down};
         float angle = 0;
-        place_body(bench.model.bodies.body[n], bench.body(n), on_circle(needle, circle, angle), 0);
-        const Vec3 swage = swage_of(needle, bench.body(n).pose), along = normalized(Vec3{0.48f, 0, 0.14f}) * segment;
-        std::vector<Vec3> path;
-        for (int i = 159; i >= 0; --i) path.push_back(swage + along * static_cast<float>(i));
-        bench.state.thread = thread::make_state(path);
-        bench.state.needle[0].thread_node = 159;
-        bench.start();
+        const Vec3 circle = needle_over_two_sheets(bench, apart, segment);
+        const uint32_t n = 0;
+        const NeedleModel& needle = bench.model.needles.needle[0];
         for (; angle < 4.8f; angle += 1.5e-3f) {
           bench.target[n] = {on_circle(needle, circle, angle), true};
           bench.step();
