@@ -77,6 +77,7 @@ constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open j
 constexpr float kStrandRoom = 2e-3f;  // [m] the same from another stitch's thread
 constexpr float kCaught = 1.5f, kCaughtFor = 0.2f;     // [N] on the hand more than the tail's tension, [s]
 constexpr float kForeign = 1;                          // [N] more than a finished stitch bears while another is tied
+constexpr float kLasts = 0.2f;                         // share of a new value per tick: a finished stitch jerks now and then
 constexpr float kStandsOn = 2;                         // [N] on jaws that have not reached the tail: a wall bears them
 constexpr float kRises = 8e-3f, kNearlyThere = 2e-3f;  // [m] by which they rise then, and from where they go down again
 constexpr float kFarthest = 9e-3f;                     // [m] of the place where a tail is taken, beyond kTailEnd
@@ -287,6 +288,7 @@ void ThreadTie::feel(const Snapshot& seen) {
     tail = std::max(0.0f, s.thread_tension[node]);
   }
   tail_felt_ += 0.5f * (tail - tail_felt_);
+  foreign_ += kLasts * (largest_tension(seen, s.thread_tension.size()) - foreign_);
 }
 
 void ThreadTie::place() {
@@ -508,8 +510,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     }
     case draw: {
-      if ((!holds && waited_ > 0.2f) || largest_tension(seen, seen.active().thread_tension.size()) >
-                                            kForeign) {  // the tail has slipped out; or more than it is held
+      if ((!holds && waited_ > 0.2f) || foreign_ > kForeign) {  // the tail has slipped out; or more than it is held
         again(seen, drop_tail);
         break;
       }

@@ -116,6 +116,7 @@ class ThreadTie {
   // Winding.
   float strand_ = 0, tail_ = 0, height_ = 0, angle_ = 0, turned_ = 0, radius_ = 0, slack_ = 0;
   float felt_ = 0, tail_felt_ = 0, pulled_ = 0, steady_ = 0, drawn_ = 0, slid_ = 0, caught_ = 0, risen_ = 0;
+  float foreign_ = 0;                        // [N] largest tension of the other sutures, smoothed
   float tail_given_ = 0, strand_given_ = 0;  // [m] by which the hands have given way
 };
 

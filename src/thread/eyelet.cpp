@@ -13,9 +13,10 @@
 namespace catgut::thread {
 namespace {
 
-constexpr float kMeet = 0.5f;   // of a segment: holes so near to each other are drawn together no further
-constexpr float kSame = 0.02f;  // of a segment: holes so near to each other have no direction between them
-constexpr float kNear = 0.3f;   // of a segment: a node so near to the hole is measured along its span, not to the hole
+constexpr float kMeet = 0.5f;      // of a segment: holes so near to each other are drawn together no further
+constexpr float kSame = 0.02f;     // of a segment: holes so near to each other have no direction between them
+constexpr float kEmbedded = 4000;  // [1/s] at which a node between two near holes takes on the tissue's motion; chosen
+constexpr float kNear = 0.3f;      // of a segment: a node so near to the hole is measured along its span, not to the hole
 
 Vec3 hole_from(const State& state, const Scratch& s, const SoftPoints& soft, uint32_t point, size_t node) {
   return ((soft.at[point] - state.x.at(node)) - state.fine.at(node)) + (s.soft_moved.at(point) - s.u.at(node));
@@ -143,6 +144,25 @@ void share_turns(const Settings& settings, State& state, Scratch& s, const SoftP
   }
 }
 
+// The node that waits between two near holes has tissue round it: across the thread it moves with that. Without, it swung
+// through both holes, and what it was thrown by grew.
+void calm_between(const Settings& settings, State& state, Scratch& s, SoftPoints& soft) {
+  const float share = std::min(1.0f, kEmbedded * settings.substep);
+  for (size_t e = 0; e + 1 < state.eyelet.size(); ++e) {
+    const Eyelet &a = state.eyelet[e], &b = state.eyelet[e + 1];
+    if (a.segment + 1 != b.segment) continue;
+    const size_t node = b.segment;
+    const float part = clamp01(2 - 2 * apart(s, soft, a, b) / state.rest[node]);
+    if (part <= 0) continue;
+    const Vec3 along = normalized(s.corner[e].in + s.corner[e + 1].out, s.corner[e].in);
+    const Vec3 v = state.v.at(node) - 0.5f * (soft.speed[a.point] + soft.speed[b.point]);
+    const Vec3 change = across(v, along) * (-part * share);
+    state.v.add(node, change);
+    for (const uint32_t point : {a.point, b.point})
+      push_soft(s, soft, point, change * (-0.5f * s.mass[node] * settings.substep), settings.substep);
+  }
+}
+
 // A node has come through the hole: its overshoot and its motion turn into the other span, and the hole takes the kick. A node
 // of slack thread passes beside the hole. The segment to the next node keeps the length that it had round the corner.
 void pass_node(State& state, Scratch& s, SoftPoints& soft, uint32_t point, size_t node, size_t next, Vec3 from, Vec3 to,
@@ -234,6 +254,7 @@ void turn_corners(const Settings& settings, State& state, Scratch& s, Surroundin
   }
   state.eyelet.resize(kept), s.corner.resize(kept);
   share_turns(settings, state, s, soft);
+  calm_between(settings, state, s, soft);
 }
 
 void grip_corners(const Settings& settings, const State& state, Scratch& s, SoftPoints& soft) {
