@@ -94,6 +94,14 @@ void MetricsCollector::tick(const Snapshot& seen) {
   held_ = held;
 }
 
+namespace {
+
+// A single stitch has two holes in either wall. With more of them, and one crossing in between, the thread is a loop that
+// crosses again where its ends are tied.
+bool is_loop(const std::vector<SuturePointView>& point, size_t crossings) { return crossings == 1 && point.size() > 4; }
+
+}  // namespace
+
 // Where the active suture crosses from one wall to the other, the largest: from the first edge's point that is nearest to the
 // crossing to the other edge.
 double MetricsCollector::wound_gap(const Snapshot& seen) const {
@@ -108,7 +116,9 @@ double MetricsCollector::wound_gap(const Snapshot& seen) const {
   for (size_t k = 0; k + 1 < point.size(); ++k)
     if (point[k].wall != point[k + 1].wall)
       most = std::max(most, gap(0.5f * (point[k].position + point[k + 1].position))), ++crossings;
-  return crossings > 1 ? most : gap(0.5f * (point.front().position + point.back().position));
+  if (crossings > 1) return most;
+  const float ends = gap(0.5f * (point.front().position + point.back().position));
+  return is_loop(point, crossings) ? std::max(most, ends) : ends;
 }
 
 // How far the edges lie inward of the line from the last hole in one wall to the first one in the other, the least of all
@@ -120,12 +130,15 @@ double MetricsCollector::edge_inversion(const Snapshot& seen) const {
   for (const std::vector<uint32_t>& rim : rim_)
     for (const uint32_t i : rim) middle += seen.particle[i] / (2 * static_cast<float>(rim.size()));
   float least = std::numeric_limits<float>::max();
-  for (size_t k = 0; k + 1 < point.size(); ++k) {
-    const Vec3 a = point[k].position, b = point[k + 1].position, at = 0.5f * (a + b), across = normalized(b - a, {1, 0, 0});
-    if (point[k].wall == point[k + 1].wall) continue;
+  const auto look = [&](Vec3 a, Vec3 b) {
+    const Vec3 at = 0.5f * (a + b), across = normalized(b - a, {1, 0, 0});
     const Vec3 out = normalized(at - middle - across * dot(at - middle, across), {0, 1, 0});
     for (const std::vector<uint32_t>& rim : rim_) least = std::min(least, dot(at - nearest_on_edge(seen, rim, at), out));
-  }
+  };
+  size_t crossings = 0;
+  for (size_t k = 0; k + 1 < point.size(); ++k)
+    if (point[k].wall != point[k + 1].wall) look(point[k].position, point[k + 1].position), ++crossings;
+  if (is_loop(point, crossings)) look(point.back().position, point.front().position);
   return least < std::numeric_limits<float>::max() ? least : kNotMeasured;
 }
 

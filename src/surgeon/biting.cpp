@@ -34,7 +34,7 @@ constexpr float kScoopSpeed = 0.7f;     // of the needle's speed, with which it 
 
 bool Scripted::pick_up(const Snapshot& seen) {
   enum { over, down, close };
-  const Pose grip = driver_grip(seen.suture[suture_].needle.pose);
+  const Pose grip = driver_grip(seen.suture[suture_].needle.pose, first_place());
   if (stage_ != over || seen.tick > 0) rest_aside(seen, kForceps);
   switch (stage_) {
     case over:
@@ -319,6 +319,7 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
   // To tie, the forceps takes the needle near its swage: the holder leaves it room. Drawn jaws are 3 mm wide, and wider open.
   const bool guided = plan_.pull <= 0;
   const float least = !present && guided ? kRoomToTie : 0;
+  const size_t next = again_ > 0 ? place_ : std::min(place_ + 1, plan_.place.size() - 1), taken_for = present ? next : place_;
   switch (stage_) {
     case bring: {
       // It is taken from the needle holder's side: the holder waits there, or its path would cross the forceps.
@@ -326,7 +327,6 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
       else
         move(kNeedleHolder, {stitch(seen) + Vec3{0.09f * plan_.driver_side, 0.09f, 0}, tying_pose(kNeedleHolder, {}).q},
              skill_.speed);
-      const size_t next = again_ > 0 ? place_ : std::min(place_ + 1, plan_.place.size() - 1);
       // Before a bite the needle is moved beside its target; before a knot high above the stitch, with its tip up and out of
       // reach.
       BiteFrame f = present ? frame(seen, next) : BiteFrame{stitch(seen), {0, 1, 0}, {0, 0, -1}, {1, 0, 0}};
@@ -339,10 +339,11 @@ bool Scripted::take_back(const Snapshot& seen, bool present) {
     }
     case over:
       jaw(kNeedleHolder, 1);
-      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose, least), 0.025f), skill_.speed)) go_down(down);
+      if (move(kNeedleHolder, raised(driver_grip(seen.active().needle.pose, taken_for, least), 0.025f), skill_.speed))
+        go_down(down);
       return false;
     case down:
-      if (move(kNeedleHolder, short_of(driver_grip(seen.active().needle.pose, least)), careful())) go(close);
+      if (move(kNeedleHolder, short_of(driver_grip(seen.active().needle.pose, taken_for, least)), careful())) go(close);
       return false;
     case close:
       if (!jaw(kNeedleHolder, 0) || waited_ < 0.3f) return false;

@@ -20,6 +20,7 @@ constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
 constexpr float kPull = 2.2f;             // [N] on each strand of a physical throw: below what the bites bear
 // [N] the same for bites through half of the wall: both strands pull at each, and with 1.7 N one tore out.
 constexpr float kPullShallow = 0.9f;
+constexpr float kPullThrough = 1.7f;    // [N] of bites in and out through a whole wall
 constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch after 1.5 mm
 // A shallow bite in a wall that is held by its edge: it gives way by this much before the tip enters, and then the needle is
 // lifted.
@@ -38,6 +39,7 @@ constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops ar
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.
 constexpr float kYields = 0.002f;
+constexpr float kYieldsThrough = 0.0045f;  // the same where the needle passes the wall twice, and nothing holds that against it
 // The same between the two cut ends: with 2 mm their stitches gaped more when the bowel was pulled (docs/operation_log.md,
 // Shallower bites).
 constexpr float kRingYields = 0.00075f;
@@ -396,6 +398,34 @@ Plan lembert_thread_plan(const PictureModel& picture, const SurgeonSkill& skill)
   return plan;
 }
 
+// One loop of a Connell suture with physical mechanics: outside in and inside out again along the edge of one bowel end,
+// straight across, and backhand the same in the other one. The thread runs in the lumen along both edges, and is tied where it
+// began.
+Plan connell_thread_plan(const PictureModel& picture, const SurgeonSkill& skill) {
+  Plan plan;
+  plan.forceps_side = -1;
+  plan.driver_at = 0.15f, plan.beyond = 0.5f;
+  plan.tip_lean = 3;  // from above: the needle is turned by half a circle under the forceps before the second bite
+  plan.pull = kPullThrough, plan.jerk = 0.1f;
+  const float radius = picture.suture[0].needle_radius;
+  for (uint32_t wall = 0; wall < 2; ++wall) {
+    const OpeningShape o = opening_shape(picture, wall);
+    BitePlace p = on_top(picture, wall, 0, skill.edge_distance);
+    p.up = o.axis;
+    p.depth = depth_of(skill.bite_length, radius, o.radius) + kYieldsThrough;
+    p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
+    p.walls = 2;
+    p.backhand = wall == 1;
+    plan.place.push_back(p);
+  }
+  add_bites(plan, 2, false);
+  plan.approximate = kApproximate, plan.stay = 0.5f * kApproximate;  // pressed harder, one edge slides under the other
+  add(plan, TaskKind::approximate);
+  add(plan, TaskKind::regrip);
+  tie_and_leave(plan);
+  return plan;
+}
+
 // A simple interrupted suture over a slit: one sweep through both edges, tied with two throws, both ends cut.
 Plan simple_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = stitch_over_gap(picture, skill);
@@ -520,6 +550,7 @@ constexpr PlanRow kPlan[] = {{"purse_string", 1, purse_string_plan},
                              {"purse_string_thread", 1, purse_string_thread_plan},
                              {"purse_string_tied", 1, purse_string_tied_plan},
                              {"lembert_thread", 2, lembert_thread_plan},
+                             {"connell_thread", 2, connell_thread_plan},
                              {"skin_tied", 2, skin_tied_plan},
                              {"simple", 2, simple_plan},
                              {"excision", 1, excision_plan},

@@ -15,15 +15,16 @@ namespace catgut {
 // Where the needle's circle cuts the tissue, at rest. The needle turns about `up`: its tip enters along `along`, which is
 // cross(out, up), and is deepest at `at - out * depth`.
 struct BitePlace {
-  Vec3 at, out, up;     // [m], unit, unit; at: on the surface, or midway between two layers
-  float length = 0;     // [m] chord from entry to exit
-  float depth = 0;      // [m]
-  uint32_t wall = 0;    // whose tissue carries it
-  bool level = false;   // hands keep the circle nearly square to `up` where the tissue is inclined
-  float deep = 0.5f;    // of the wall, at which a needle that is scooped is lifted
-  float deepest = 0;    // of the wall: a deeper bite, or one that ends on the inner face, is made again; 0: may go through
-  int walls = 1;        // passages through a wall that the sweep makes
-  uint32_t suture = 0;  // that makes it
+  Vec3 at, out, up;       // [m], unit, unit; at: on the surface, or midway between two layers
+  float length = 0;       // [m] chord from entry to exit
+  float depth = 0;        // [m]
+  uint32_t wall = 0;      // whose tissue carries it
+  bool level = false;     // hands keep the circle nearly square to `up` where the tissue is inclined
+  float deep = 0.5f;      // of the wall, at which a needle that is scooped is lifted
+  float deepest = 0;      // of the wall: a deeper bite, or one that ends on the inner face, is made again; 0: may go through
+  int walls = 1;          // passages through a wall that the sweep makes
+  bool backhand = false;  // both hands come from the other sides of the needle's plane
+  uint32_t suture = 0;    // that makes it
 };
 
 // The current frame of a bite in the world: position, outward direction, direction of the needle, axis of its rotation.

@@ -158,7 +158,7 @@ void Scripted::miss(int back_to) {
 
 void Scripted::rest_aside(const Snapshot& seen, size_t hand) {
   const BiteFrame f = frame(seen, place_);
-  const float side = hand == kNeedleHolder ? plan_.driver_side : plan_.forceps_side;
+  const float side = side_of(hand, place_);
   const Vec3 lateral = plan_.forceps_side == plan_.driver_side ? f.along * (hand == kNeedleHolder ? -0.05f : 0.05f) : Vec3{};
   const Vec3 p = picture_.focus + f.out * 0.07f + f.up * (0.09f * side) + lateral;
   move(hand, {p, hand_[hand].pose.q}, skill_.speed);
@@ -192,20 +192,20 @@ Pose Scripted::grip_at(const Pose& needle, float s, float side, float lean, floa
   return {needle.p + radial * shape().needle_radius, from_axes(x, y, z)};
 }
 
-Pose Scripted::driver_grip(const Pose& needle, float least) const {
-  return grip_at(needle, std::max(plan_.driver_at, least), plan_.driver_side, plan_.lift > 0 ? 0.0f : 0.7f, 0.2f);
+Pose Scripted::driver_grip(const Pose& needle, size_t place, float least) const {
+  return grip_at(needle, std::max(plan_.driver_at, least), side_of(kNeedleHolder, place), plan_.lift > 0 ? 0.0f : 0.7f, 0.2f);
 }
 
 Pose Scripted::forceps_grip(const Pose& needle) const {
   if (plan_.lumen) return tip_grip(needle, tip_way_);
   // After a miss from another side: thread may be in the way.
   const float lean = plan_.pull > 0 ? plan_.tip_lean * (1 - kOtherLean * static_cast<float>(misses_ % 4)) : plan_.tip_lean;
-  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.lift > 0 ? 0.3f : lean, plan_.tip_psi);
+  return grip_at(needle, kForcepsAt, side_of(kForceps, place_), plan_.lift > 0 ? 0.3f : lean, plan_.tip_psi);
 }
 
 Pose Scripted::tip_grip(const Pose& needle, size_t way) const {
   const TipWay& w = kTipWay[way % std::size(kTipWay)];
-  return grip_at(needle, kForcepsAt, plan_.forceps_side, plan_.tip_lean * w.lean, plan_.tip_psi + w.psi);
+  return grip_at(needle, kForcepsAt, side_of(kForceps, place_), plan_.tip_lean * w.lean, plan_.tip_psi + w.psi);
 }
 
 // The first way to the tip on which no wall and no stitch is between the blades or in front of them; after a miss another one.
@@ -300,7 +300,7 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   rest_aside(seen, kNeedleHolder);
   if (seen.active().suture_point.empty()) return true;
   const Vec3 way = plan_.lift > 0 ? normalized(frame_.out * 0.85f + frame_.up * 0.4f)
-                                  : normalized(frame_.out + frame_.up * (0.35f * plan_.forceps_side));
+                                  : normalized(frame_.out + frame_.up * (0.35f * side_of(kForceps, place_)));
   const size_t n = seen.active().suture_point.size();
   float slack = 0;
   if (kind == TaskKind::pull_tail) {

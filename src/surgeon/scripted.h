@@ -73,6 +73,10 @@ class Scripted final : public Surgeon {
   BiteFrame frame(const Snapshot& seen, size_t place) const;
   const BitePlace& bite() const { return plan_.place[place_]; }
   size_t first_place() const;  // of the suture in hand
+  // The side of the needle's plane from which a hand comes, +1: its `up`.
+  float side_of(size_t hand, size_t place) const {
+    return (hand == kNeedleHolder ? plan_.driver_side : plan_.forceps_side) * (plan_.place[place].backhand ? -1.0f : 1.0f);
+  }
   const SuturePicture& shape() const { return picture_.suture[suture_]; }
   float half_bite_angle() const { return portable::asin(std::min(0.9f, 0.5f * bite().length / shape().needle_radius)); }
 
@@ -82,7 +86,8 @@ class Scripted final : public Surgeon {
   // A tool frame that grips the needle (at `needle`) at fraction s of its arc: the shaft leaves the needle's plane on `side`,
   // leans by `lean` toward the outside of the tissue when the tip is `psi` past the deepest point.
   Pose grip_at(const Pose& needle, float s, float side, float lean, float psi) const;
-  Pose driver_grip(const Pose& needle, float least = 0) const;  // least: of the arc
+  // least: of the arc; place: whose bite it is taken for.
+  Pose driver_grip(const Pose& needle, size_t place, float least = 0) const;
   Pose forceps_grip(const Pose& needle) const;
   Pose tip_grip(const Pose& needle, size_t way) const;
   void choose_tip_way(const Snapshot& seen);

