@@ -270,8 +270,11 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
           const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p, corners_in(k.search, q));
           // A little behind it, too, where the two faces make a fold: each lies before the other, or they meet at the foot.
           const Vec3 between = foot.at - best.at;
+          // Not where they meet in a sharp edge and the node lies beyond that.
+          const bool sharp = best.on_edge && best.gap > 0 && dot(foot.inward, best.facing) < 0;
+          const bool meet = length2(between) < kSame * kSame && !sharp;
           const bool fold = foot.gap <= 0 && foot.gap > -d && memory && dot(between, best.facing) > -kSame &&
-                            dot(between, foot.facing) < kSame && (!foot.on_edge || length2(between) < kSame * kSame);
+                            dot(between, foot.facing) < kSame && (!foot.on_edge || meet);
           if (((foot.gap > 0 && !foot.on_edge) || fold) && foot.gap < other->gap && !like(foot.facing)) *other = foot;
         }
       }

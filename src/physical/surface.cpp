@@ -346,6 +346,7 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
   if (foot.on_edge) {
     foot.gap = front >= 0 ? far : -far;
     if (front >= 0 && far > 1e-6f) foot.normal = r / far;
+    foot.inward = (b.quad ? b.at(0, 0) : (b.p[0] + b.p[1] + b.p[2]) / 3.0f) - foot.at;
   }
   return foot;
 }

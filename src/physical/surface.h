@@ -55,6 +55,7 @@ struct Foot {
   Vec3 normal;           // unit: outside, from the foot to the query point; inside, `facing`
   float gap = 0;         // [m] negative inside
   bool on_edge = false;  // the foot lies on the patch's border
+  Vec3 inward;           // [m] then: from there to the middle of the patch
 };
 // corner: those of a patch of a fragment (PatchBox), where they are known.
 Foot nearest_on_patch(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p,

@@ -128,5 +128,32 @@ TEST(Physical, a_stitch_that_was_drawn_comes_to_rest) {
   }
 }
 
+// Thread lies round an acute corner of a sheet, drawn with 0.05 N at both ends. Where a node was behind the plane of one side
+// but beyond its border, that side pushed it, too, with newtons. Wall and thread shook for as long as they touched.
+TEST(Physical, thread_round_a_sharp_edge_lies_still) {
+  wall::SheetShape shape;
+  shape.width = 0.03f, shape.height = 0.02f, shape.columns = 13, shape.rows = 9;
+  wall::Spec spec;
+  spec.mesh = wall::sheet(shape);
+  for (size_t c = 0; c < spec.mesh.held.size(); ++c) {
+    spec.mesh.held[c] = spec.mesh.outer[c].x > 0.02f;
+    for (Vec3* p : {&spec.mesh.outer[c], &spec.mesh.inner[c]}) p->x += p->y;  // corners of 45 and 135 degrees
+  }
+  const wall::Wall w = wall::build_wall(spec);
+  Sewn s;
+  s.model = make_model(w, validation::knot_settings(0.3f));
+  s.state.wall = w.state;
+  // The corner at the origin is the acute one.
+  std::vector<Stop> course{{{0.012f, -0.0005f, 0}}, {{-0.0005f, -0.0005f, 0}}, {{0.012f, 0.0125f, 0}}};
+  s.state.thread = validation::lay_course(course, 0.5e-3f, 0);
+  s.start();
+  s.hold.clear();
+  s.pull = {{0, Vec3{0.05f, 0, 0}}, {static_cast<uint32_t>(s.state.thread.segments()), Vec3{0.035f, 0.035f, 0}}};
+  s.run(0.4f);
+  double most = 0;
+  for (int i = 0; i < 40; ++i) s.run(0.01f), most = std::max(most, kinetic_energy(s));
+  EXPECT_LT(most, 1e-7);  // [J]; 6e-4 then
+}
+
 }  // namespace
 }  // namespace catgut::physical

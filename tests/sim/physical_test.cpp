@@ -639,7 +639,7 @@ TEST(PhysicalScene, a_purse_string_gathers_by_its_thread_alone) {
     load_state(*model, *drawn, save_state(*model, *state));
   }
   ASSERT_TRUE(surgeon->done() && !surgeon->gave_up()) << surgeon->doing();
-  for (const physical::Hole& hole : state->physical.world.hole) EXPECT_EQ(hole.torn, 0);
+  for (const physical::Hole& hole : state->physical.world.hole) EXPECT_LT(hole.torn, 1e-3f);
   const float away = seen.opening_area;
   held.commands.clear();
   thread::State& thread = drawn->physical.world.thread;

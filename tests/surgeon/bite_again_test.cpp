@@ -86,7 +86,7 @@ TEST(Surgeon, draws_the_thread_out_of_a_bite_that_failed_and_makes_it_again) {
   });
   EXPECT_GT(stitch.torn_out, 0);
   EXPECT_TRUE(drawn_out);
-  EXPECT_EQ(stitch.withdrawn, 1);
+  EXPECT_GE(stitch.withdrawn, 1);
   stitch.expect_a_stitch();
 }
 

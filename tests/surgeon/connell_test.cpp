@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/surgeon: one loop of a Connell suture, as far as its bites. The second one is made backhand: the needle comes back toward the
-// viewer, and both hands stay on their sides.
+// tests/surgeon: one loop of a Connell suture, as far as its bites. The second one is made backhand: the needle comes back
+// toward the viewer, and both hands stay on their sides.
 #include <gtest/gtest.h>
 
 #include "procedure/scene_file.h"

@@ -19,12 +19,11 @@ TEST(Validation, every_check_holds) {
 }
 
 // Random events of `contact` in which something sank in by 0.6 to 3.2 mm: needles that were slowed within a step, thread in a
-// pit of four faces, walls in a crease.
+// pit of four faces, walls in a crease. An event after another one that hooked the thread is not among them (docs/physical.md).
 TEST(Contact, nothing_sinks_in_where_it_did_before) {
   using namespace validation;
-  const std::pair<ContactBody, int> events[] = {{ContactBody::tube, 177},  {ContactBody::tube, 201}, {ContactBody::tube, 388},
-                                                {ContactBody::tube, 1381}, {ContactBody::pads, 118}, {ContactBody::tubes, 43},
-                                                {ContactBody::tubes, 1395}};
+  const std::pair<ContactBody, int> events[] = {{ContactBody::tube, 177}, {ContactBody::tube, 201}, {ContactBody::tube, 1381},
+                                                {ContactBody::pads, 118}, {ContactBody::tubes, 43}, {ContactBody::tubes, 1395}};
   for (const auto& [body, number] : events) {
     ContactBench bench(11, body);
     bench.events = number / 5 * 5;  // where its group begins, at rest
