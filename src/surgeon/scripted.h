@@ -5,6 +5,7 @@
 // did not exit is withdrawn and driven slightly shallower or deeper, a missed grasp is approached again, a throw whose loop
 // did not hold is wound again. Bites are in biting.cpp, knots in tying.cpp, scissors in finishing.cpp.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <string>
@@ -75,7 +76,8 @@ class Scripted final : public Surgeon {
   size_t first_place() const;  // of the suture in hand
   // The side of the needle's plane from which a hand comes, +1: its `up`.
   float side_of(size_t hand, size_t place) const {
-    return (hand == kNeedleHolder ? plan_.driver_side : plan_.forceps_side) * (plan_.place[place].backhand ? -1.0f : 1.0f);
+    const BitePlace& bite = plan_.place[std::min(place, plan_.place.size() - 1)];
+    return (hand == kNeedleHolder ? plan_.driver_side : plan_.forceps_side) * (bite.backhand ? -1.0f : 1.0f);
   }
   const SuturePicture& shape() const { return picture_.suture[suture_]; }
   float half_bite_angle() const { return portable::asin(std::min(0.9f, 0.5f * bite().length / shape().needle_radius)); }
