@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Makes docs/media/purse_string_thread.jpg: the rim gathered by its thread, and let go. And docs/media/connell_thread.jpg: the second
-# bite begins, and the tied loop. Three minutes.
+# bite, and the tied loop. Three minutes.
 #   tools/make_closure.sh [FOLDER]     folder of the PNGs (default out/closure)
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
