@@ -20,21 +20,18 @@ constexpr float kWindAt = 9e-3f;     // [m] of the shaft: plane of the winding h
 constexpr float kSteepOnFlat = 3;    // rise of the shaft at a tail on flat tissue: a jaw beside the tail, none under it
 constexpr float kTurns = 3;          // [1/s]
 constexpr float kTurnLeft =
-    2 * kPi - 2;                       // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
-constexpr float kShaft = 2.2e-3f;      // [m] radius that the turns lie on
-constexpr float kJawsRound = 1.7e-3f;  // [m] the same of two turns, which take up no more than they must: round the jaws
-constexpr float kNearest = 9e-3f;      // [m] of the winding hand from the shaft
-constexpr float kLoose = 0.95f;        // of the strand that is left: nearly taut
-constexpr float kWinding = 0.25f;      // [N] above which the winding hand yields
-constexpr float kTailEnd = 6e-3f, kNearer = 2e-3f;  // [m] from the tail's end, where it is taken; more after each miss
-constexpr float kBetweenJaws = 0.6e-3f;             // [m] from the line midway between the jaws: they close on the tail there
-constexpr float kJaws = 4.4e-3f;                    // [m] of their length, that a tail is taken with: all but the very tips
-constexpr float kBite = 5e-3f;                      // [m] of their length, that thread is held by
-constexpr float kHeldWell = 1.5e-3f;  // [m] the same of a tail that turns slide over; between jaws and tail they come off
-constexpr float kPinched = 0.8e-3f;   // [m] from there, a strand is held with the tail: a turn on the jaws is farther away
-constexpr float kBeside = 4e-3f;      // [m] of tail, on either side of the jaws
-constexpr float kPatience = 2;        // [s]; then they close where they are
-constexpr float kAhead = 4e-3f;       // [m] of the hand before the jaws, at most
+    2 * kPi - 2;                         // [rad] round the shaft, of a turn whose strands lead away to the knot and to the hand
+constexpr float kShaft = 2.2e-3f;        // [m] radius that the turns lie on
+constexpr float kJawsRound = 1.7e-3f;    // [m] the same of two turns, which take up no more than they must: round the jaws
+constexpr float kNearest = 9e-3f;        // [m] of the winding hand from the shaft
+constexpr float kLoose = 0.95f;          // of the strand that is left: nearly taut
+constexpr float kWinding = 0.25f;        // [N] above which the winding hand yields
+constexpr float kBetweenJaws = 0.6e-3f;  // [m] from the line midway between the jaws: they close on the tail there
+constexpr float kJaws = 4.4e-3f;         // [m] of their length, that a tail is taken with: all but the very tips
+constexpr float kHeldWell = 1.5e-3f;     // [m] the same of a tail that turns slide over; between jaws and tail they come off
+constexpr float kBeside = 4e-3f;         // [m] of tail, on either side of the jaws
+constexpr float kPatience = 2;           // [s]; then they close where they are
+constexpr float kAhead = 4e-3f;          // [m] of the hand before the jaws, at most
 // The same in a lumen: a wall or a finished stitch in the way bears 2.4 N.
 constexpr float kGentle = 0.8e-3f;
 constexpr float kNearTail = 20e-3f;  // [m] from the tail: a hand nearer than that is gentle
@@ -45,15 +42,8 @@ constexpr float kNarrow = 0.5f;      // of the jaws with a turn on them: in a wi
 constexpr float kTaut = 1.2f;        // [N] above which a strand gives no more thread to crossing hands
 constexpr float kReach = 0.85f;      // of the tail's length
 constexpr float kSlideOff = 1.4f;    // [s]
-// Of the strand's length: where it is wound. Lower, the needle that goes round would meet the tail, which stands up from a
-// knot.
-constexpr float kHigh = 0.62f;
-// The same for two turns, which need more of it. Half of the strand's length or less, and the hand meets the tail on the
-// tissue.
-constexpr float kHighTwice = 0.57f;
-constexpr float kDrawn = 0.5f;  // of the strand's length: height to which the tail is drawn at most
-constexpr float kLow = 4e-3f;   // [m] above the stitch, where strands are pulled
-constexpr float kKnot = 5e-3f;  // [m] from the middle of the stitch: thread nearer than this belongs to the knot
+constexpr float kDrawn = 0.5f;       // of the strand's length: height to which the tail is drawn at most
+constexpr float kLow = 4e-3f;        // [m] above the stitch, where strands are pulled
 // [N] of either strand before the pull. One strand that is tauter than the other straightens in the throws below, and the other
 // one winds round it: they capsize into half hitches, which slide.
 constexpr float kEasy = 0.12f;
@@ -70,17 +60,12 @@ constexpr float kTight = 0.8f;        // [s] of a strand that gives no way; then
 constexpr int kAgain = 5;             // times that a throw is wound again
 constexpr int kEnough = 3;            // throws of a knot that holds; a further one that fails is left
 constexpr int kMostMisses = 3;        // grasps at the tail with a turn on the jaws
-constexpr float kDeep = 4e-3f;        // [m] below the stitch: walls are beside a tail there
 constexpr float kBears = 3;           // [N] on a bite, above which the hands give way
 constexpr float kOverDrape = 12e-3f;  // [m] of the swage: the needle, which hangs down from the forceps, would scrape on it
-constexpr float kRoom = 4e-3f;        // [m] from the tissue's particles: open jaws have none of it between them
-constexpr float kStrandRoom = 2e-3f;  // [m] the same from another stitch's thread
 constexpr float kCaught = 1.5f, kCaughtFor = 0.2f;     // [N] on the hand more than the tail's tension, [s]
 constexpr float kForeign = 1;                          // [N] more than a finished stitch bears while another is tied
-constexpr float kLasts = 0.2f;                         // share of a new value per tick: a finished stitch jerks now and then
 constexpr float kStandsOn = 2;                         // [N] on jaws that have not reached the tail: a wall bears them
 constexpr float kRises = 8e-3f, kNearlyThere = 2e-3f;  // [m] by which they rise then, and from where they go down again
-constexpr float kFarthest = 9e-3f;                     // [m] of the place where a tail is taken, beyond kTailEnd
 
 SeenThrows look(const Snapshot& seen) {
   std::vector<Vec3> thread;
@@ -121,50 +106,12 @@ std::string ThreadTie::doing() const {
   return kName[stage_];
 }
 
-// [m] of tail or strand from its hole to its hand, beyond the straight way from the stitch.
-float ThreadTie::slack_of(const Snapshot& seen, bool tail) const {
-  const size_t hand = tail ? node_of(seen, seen.tool[kHolder].held_slot) : seen.active().thread_order.size() - 1;
-  return length_between(seen, tail ? first_point_node(seen) : last_point_node(seen), hand) -
-         distance(node_at(seen, hand), origin_);
-}
-
-Vec3 ThreadTie::tail_node(const Snapshot& seen, float from_end) const {
-  return node_at(seen, node_along(seen, 0, from_end, 1));
-}
-
-// [m] from the tail's end, where the jaws take it: clear of walls, if it hangs down between them, and of other stitches'
-// strands. Jaws that close on an edge or a strand beside it tear bites out.
-float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
-  const bool deep = tail_node(seen, wanted).y <= origin_.y - kDeep;
-  if (!deep && room_at(picture_, seen, tail_node(seen, wanted), false, kRoom) > kStrandRoom) return wanted;
-  float best = wanted, most = 0;
-  for (float at = wanted; at < wanted + kFarthest && at < tail_ - kKnot; at += 1e-3f) {
-    const float room = room_at(picture_, seen, tail_node(seen, at), deep, kRoom);
-    if (room > 1.05f * most) best = at, most = room;
-  }
-  return best;
-}
-
 float ThreadTie::held_tail() const { return tail_ - kTailEnd - kNearer * static_cast<float>(misses_); }
-
-// [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
-// not count.
-float ThreadTie::wound(const Snapshot& seen) const {
-  const Pose& tool = seen.tool[kHolder].pose;
-  float sum = 0;
-  Vec3 before;
-  bool on = false;
-  for (size_t i = last_point_node(seen); i < seen.active().thread_order.size(); ++i) {
-    const Vec3 p = to_local(tool, node_at(seen, i)), flat{p.x, p.y, 0};
-    if (on && p.z > -2e-3f) sum += portable::atan2(before.x * flat.y - before.y * flat.x, dot(before, flat));
-    before = flat, on = p.z > -2e-3f;
-  }
-  return -side_ * sense_ * sum;
-}
 
 void ThreadTie::again(const Snapshot& seen, Stage after) {
   ++retries_, misses_ = 0;
   lost_ = after == drop_tail;
+  snugs_ = after != to_work && throws_ == 2;
   if (++tries_ <= kAgain) return go(seen, after);
   const SeenThrows knot = look(seen);
   failed_ = !is_enough(knot), ends_ = true;
@@ -174,29 +121,6 @@ void ThreadTie::again(const Snapshot& seen, Stage after) {
 
 // A throw has failed again and again, and the knot holds without it.
 bool ThreadTie::is_enough(const SeenThrows& knot) const { return tries_ >= kAgain && knot.alternating() >= kEnough; }
-
-// The other side, and the free thread beyond the knot, which takes up some millimeters with every throw.
-void ThreadTie::measure(const Snapshot& seen) {
-  const size_t last = seen.active().thread_order.size() - 1;
-  size_t tail_at = first_point_node(seen), strand_at = last_point_node(seen);
-  const auto near = [&](size_t i) { return distance(node_at(seen, i), origin_) < kKnot; };
-  if (!first_) {
-    for (size_t i = 0; i < tail_at; ++i)
-      if (near(i)) tail_at = i;
-    for (size_t i = last; i > strand_at; --i)
-      if (near(i)) strand_at = i;
-  }
-  const float out = first_ ? 0.0f : kKnot;
-  strand_ = length_between(seen, strand_at, last) + out, tail_ = length_between(seen, 0, tail_at) + out;
-  height_ = (wraps_ > 1 ? kHighTwice : kHigh) * strand_;
-}
-
-// The jaws hold the long strand, too: drawn with the tail, it would tear its bites out.
-bool ThreadTie::pinches_strand(const Snapshot& seen) const {
-  for (size_t i = last_point_node(seen) + 1; i < seen.active().thread_order.size(); ++i)
-    if (length2(from_jaws(seen.tool[kHolder], node_at(seen, i), kBite)) < kPinched * kPinched) return true;
-  return false;
-}
 
 // What the knot lacks is wound from this side.
 void ThreadTie::wind_next(const SeenThrows& knot) {
@@ -277,20 +201,6 @@ void ThreadTie::lead_by(float most, Vec3 jaws) {
   tip_ = jaws + (tip_ - jaws) * std::min(1.0f, most / std::max(distance(tip_, jaws), 1e-6f));
 }
 
-void ThreadTie::feel(const Snapshot& seen) {
-  const SutureView& s = seen.active();
-  const float now = s.thread_tension[s.thread_order.size() - 3];
-  felt_ += 0.5f * (std::max(0.0f, now) - felt_);
-  const ToolView& holder = seen.tool[kHolder];
-  float tail = 0;
-  if (holder.held == Held::thread) {
-    const size_t node = std::clamp<size_t>(node_of(seen, holder.held_slot) + 2, 0, s.thread_tension.size() - 1);
-    tail = std::max(0.0f, s.thread_tension[node]);
-  }
-  tail_felt_ += 0.5f * (tail - tail_felt_);
-  foreign_ += kLasts * (largest_tension(seen, s.thread_tension.size()) - foreign_);
-}
-
 void ThreadTie::place() {
   hand_.y = std::max(hand_.y, picture_.drape + kOverDrape);
   hands_[kHolder].pose = {tip_, holder_turn_};
@@ -334,7 +244,8 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case lay_tail: {
       steady_ = 0;
       const Vec3 root = first_ ? seen.active().suture_point.front().position : origin_;
-      glide_to(root - line_ * (side_ * (tail_ - kTailEnd - 2e-3f)) + Vec3{0, 1e-3f, 0}, hand_, 0.4f * how_.speed,
+      glide_to(root - line_ * (side_ * (tail_ - kTailEnd - 2e-3f)) + Vec3{0, 1e-3f, 0},
+               snugs_ ? origin_ + line_ * (side_ * 0.85f * strand_) + Vec3{0, 4e-3f + kLow, 0} : hand_, 0.4f * how_.speed,
                forceps_angle_);
       break;
     }
@@ -383,8 +294,8 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case lay:
       pulled_ = std::min(felt_, tail_felt_);
       // Both strands alike, and slowly.
-      glide_to(tip_ - line_ * (side_ * 2e-3f) - Vec3{0, 3e-3f, 0}, hand_ + line_ * (side_ * 2e-3f), 0.06f * how_.speed,
-               forceps_angle_);
+      glide_to(tip_ - line_ * (side_ * outward_ * 2e-3f) - Vec3{0, 3e-3f, 0}, hand_ + line_ * (side_ * outward_ * 2e-3f),
+               0.06f * how_.speed, forceps_angle_);
       break;
     case away:
       glide_to(tip_ + shaft * 0.06f, hand_, how_.speed, forceps_angle_);
@@ -443,7 +354,13 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
     case lay_tail: {  // no farther than both strands give way
       const float pace = std::clamp(1.5f - std::max(felt_, tail_felt_) / kWinding, 0.0f, 1.0f);
       steady_ = pace < 0.05f ? steady_ + dt : 0;
-      if (glide(pace * dt) || steady_ > kTight || waited_ > 2 * kPatience) go(seen, stage_ == lift_tail ? lay_tail : drop_tail);
+      const bool there = glide(pace * dt);
+      // Hands that keep the strands taut here would open a throw below that has not tightened.
+      if (throws_ > 1) tip_ = give(tip_, tail_felt_, tail_given_, dt), hand_ = give(hand_, felt_, strand_given_, dt);
+      if (there || steady_ > kTight || waited_ > 2 * kPatience) {
+        if (stage_ == lay_tail && snugs_) outward_ = -1;
+        go(seen, stage_ == lift_tail ? lay_tail : snugs_ ? pull : drop_tail);
+      }
       break;
     }
     case drop_tail:
@@ -560,7 +477,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const float easy = std::clamp(1 - std::min(felt_, tail_felt_) / kEasy, 0.0f, 1.0f);
       const float more = slack_of(seen, true) - slack_of(seen, false);
       const float even = stage_ == pull ? dt * std::clamp(kEvens * more, -kFastest, kFastest) * easy : 0.0f;
-      tip_ += line_ * (side_ * (pace(tail_felt_, felt_) + even)), hand_ -= line_ * (side_ * (pace(felt_, tail_felt_) - even));
+      const Vec3 out = line_ * (side_ * outward_);
+      tip_ += out * (pace(tail_felt_, felt_) + even), hand_ -= out * (pace(felt_, tail_felt_) - even);
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
       const bool down = how_.lumen && throws_ == 1;
       if (down && stage_ == pull && std::min(felt_, tail_felt_) > 0.7f * how_.pull)
@@ -573,12 +491,14 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         break;
       }
       if (stage_ == pull && (steady_ > (down ? kSeatedFirst : kSeated) || waited_ > 12 || lost))
-        go(seen, look(seen).alternating() >= wanted_ ? hold : lay);
+        go(seen, outward_ > 0 && look(seen).alternating() >= wanted_ ? hold : lay);
       else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);
       break;
     }
     case lay:
-      if (glide(dt)) go(seen, release);
+      if (!glide(dt)) break;
+      go(seen, outward_ > 0 ? release : drop_tail);
+      outward_ = 1, snugs_ = false;
       break;
     case release:
       if (move_jaw(holder, kHalfOpen, dt)) go(seen, away);

@@ -95,10 +95,11 @@ class ThreadTie {
   Vec3 line_;  // unit: from the strand's hand to the tail's, where side_ is +1
   Stage stage_ = done;
   int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0, throws_ = 0;
-  float side_ = 1, sense_ = 1, waited_ = 0;
+  float side_ = 1, sense_ = 1, waited_ = 0, outward_ = 1;
   int wanted_ = 0;  // throws that the knot shall have
   bool first_ = false, failed_ = false, keep_ = false;
   bool lost_ = false;                // the tail: it is taken and laid again first
+  bool snugs_ = false;               // the first throw, once more, before the second is wound again
   bool ends_ = false;                // no more throws: everything is let go
   float laid_ = 1, first_laid_ = 1;  // hand of this throw, of the first: +1 right
   Vec3 origin_;                      // the middle of the stitch
