@@ -30,7 +30,7 @@ void each_node_column(thread::State& to, const thread::State& from, Visit visit)
 }  // namespace
 
 void AwakeThread::reserve(const State& s) {
-  const size_t nodes = s.thread.nodes(), pairs = std::max<size_t>(4096, s.thread.key.capacity());
+  const size_t nodes = s.thread.nodes(), pairs = thread::pair_capacity(nodes);
   each_node_column(part, part, [&](thread::Column& c, const thread::Column&) { c.reserve(nodes); });
   part.rest.reserve(nodes), part.tension.reserve(nodes), part.broken.reserve(nodes);
   part.key.reserve(pairs), part.budget.reserve(pairs), part.crossing.reserve(pairs), part.eyelet.reserve(thread::kMaxEyelets);

@@ -170,7 +170,7 @@ std::shared_ptr<const PhysicalModel> make_physical(const Model& model, const wal
   // Threads one after the other, as their particles are; nothing joins the end of one and the beginning of the next.
   const auto first = model.start.begin() + static_cast<std::ptrdiff_t>(model.solver.tissue);
   const std::vector<Vec3> path(first, model.start.end());
-  made->start.thread = thread::make_state(path, 8192);
+  made->start.thread = thread::make_state(path);
   for (const StrandModel& strand : model.solver.strand)
     if (strand.first_slot > model.solver.tissue) {
       const size_t between = strand.first_slot - model.solver.tissue - 1;

@@ -387,12 +387,12 @@ void apply_corners(const State& state, Scratch& s, SoftPoints& soft, float subst
   }
 }
 
-State make_laced_state(std::span<const Vec3> path, std::span<const int32_t> hole, float hole_friction, size_t crossings) {
+State make_laced_state(std::span<const Vec3> path, std::span<const int32_t> hole, float hole_friction) {
   CATGUT_CHECK(path.size() == hole.size());
   std::vector<Vec3> node;
   for (size_t i = 0; i < path.size(); ++i)
     if (hole[i] < 0) node.push_back(path[i]);
-  State state = make_state(node, crossings);
+  State state = make_state(node);
   size_t nodes = 0;
   for (size_t i = 0; i < path.size(); ++i) {
     if (hole[i] < 0) {

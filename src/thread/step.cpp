@@ -228,7 +228,7 @@ void break_overloaded(const Settings& settings, State& state) {
 
 }  // namespace
 
-State make_state(std::span<const Vec3> path, size_t crossings) {
+State make_state(std::span<const Vec3> path) {
   CATGUT_CHECK(path.size() >= kLeastNodes && path.size() < kTool);
   const size_t n = path.size();
   State s;
@@ -238,7 +238,8 @@ State make_state(std::span<const Vec3> path, size_t crossings) {
   for (size_t i = 0; i + 1 < n; ++i) s.rest.push_back(distance(path[i], path[i + 1]));
   s.tension.assign(n - 1, 0), s.broken.assign(n - 1, 0);
   s.eyelet.reserve(kMaxEyelets);
-  s.key.reserve(crossings), s.budget.reserve(crossings), s.crossing.reserve(crossings);
+  const size_t pairs = pair_capacity(n);
+  s.key.reserve(pairs), s.budget.reserve(pairs), s.crossing.reserve(pairs);
   s.travel = 1e9f;  // the list is empty
   return s;
 }
@@ -249,8 +250,9 @@ uint64_t hash_state(const State& state) {
   return hasher.hash;
 }
 
-Stepper::Stepper(size_t max_nodes, size_t max_crossings) : scratch_(std::make_unique<Scratch>()) {
+Stepper::Stepper(size_t max_nodes) : scratch_(std::make_unique<Scratch>()) {
   Scratch& s = *scratch_;
+  const size_t max_crossings = pair_capacity(max_nodes);
   s.max_nodes = max_nodes, s.max_crossings = max_crossings;
   for (Padded3* c : {&s.u, &s.force, &s.e, &s.n, &s.moment, &s.middle, &s.edge}) c->resize(max_nodes);
   for (Padded* c : {&s.mass,          &s.w,         &s.move,          &s.rest,     &s.inverse_rest, &s.keep,

@@ -177,6 +177,33 @@ TEST(Thread, hangs_over_a_tool_and_weighs_on_it) {
   EXPECT_NEAR(tool.force_a.y, tool.force_b.y, 0.02);
 }
 
+// A scene with twelve sutures: 2200 nodes lie turn beside turn, and the last thread of all hangs over a rod. When the list of
+// pairs was full it lost those of the last thread, which passed through a needle holder.
+TEST(Thread, touches_a_rod_however_much_thread_lies_in_turns) {
+  Settings settings = plain();
+  settings.gravity = {};
+  std::vector<Vec3> path;
+  constexpr float kTurn = 2e-3f, kSegment = 0.5e-3f, kPitch = 0.8e-3f;  // [m]
+  for (int i = 0; i < 2200; ++i) {
+    const float angle = kSegment / kTurn * static_cast<float>(i);
+    path.push_back({kTurn * std::cos(angle), 0.1f + kPitch * angle / 6.2831853f, kTurn * std::sin(angle)});
+  }
+  for (const Vec3 p : line(41, {-10e-3f, 2.7e-3f, 0}, {kSegment, 0, 0})) path.push_back(p);
+  State state = make_state(path);
+  state.broken[2199] = 1, state.rest[2199] = kSegment;
+  Stepper stepper(state.nodes());
+  ToolCapsule rod;
+  rod.a = rod.to_a = {0, 0, -0.02f}, rod.b = rod.to_b = {0, 0, 0.02f}, rod.radius = 2.5e-3f;
+  const std::vector<Pull> ends{{2200, {0, -0.1f, 0}}, {2240, {0, -0.1f, 0}}};
+  Surroundings around;
+  around.tools = {&rod, 1}, around.pulls = ends;
+  for (int i = 0; i < 100; ++i) stepper.step(settings, state, around);
+  EXPECT_GT(state.key.size(), 4096u) << "or the list was not full before, either";
+  EXPECT_EQ(state.overflow, 0u);
+  EXPECT_NEAR(state.position(2220).y, 2.5e-3f + 0.5f * settings.material.diameter, 0.05e-3f);
+  EXPECT_NEAR(rod.force_a.y + rod.force_b.y, -0.2f, 0.01f) << "the rod bears both weights";
+}
+
 TEST(Thread, slides_down_a_slope_steeper_than_its_friction_only) {
   for (const float slope : {0.25f, 0.35f}) {
     Settings settings = plain();
