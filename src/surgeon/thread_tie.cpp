@@ -111,7 +111,7 @@ float ThreadTie::held_tail() const { return tail_ - kTailEnd - kNearer * static_
 void ThreadTie::again(const Snapshot& seen, Stage after) {
   ++retries_, misses_ = 0;
   lost_ = after == drop_tail;
-  snugs_ = after != to_work && throws_ == 2;
+  snugs_ = after != to_work && throws_ == 2 && !keep_;  // an assistant holds the first throw of one that keeps
   if (++tries_ <= kAgain) return go(seen, after);
   const SeenThrows knot = look(seen);
   failed_ = !is_enough(knot), ends_ = true;
