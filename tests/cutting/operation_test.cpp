@@ -205,7 +205,7 @@ TEST(Operation, a_stage_begins_from_a_saved_state) {
   begin_run(run, procedure, f.seen, static_cast<double>(f.model->dt));
   std::unique_ptr<Surgeon> surgeon = scripted_surgeon(scene, picture_model(*f.model));
   bool again = false;
-  while (!surgeon->done() && !finished(run, procedure) && f.state->tick < 20000) {
+  while (!surgeon->done() && !finished(run, procedure) && f.state->tick < 110000) {
     f.input = surgeon->operate(f.seen, f.model->dt);
     f.tick();
     if (!update_run(run, procedure, f.seen) ||
