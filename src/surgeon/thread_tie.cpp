@@ -253,7 +253,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       glide_to(tip_ + shaft * (lost_ ? 0.06f : 0.03f), hand_, how_.speed, forceps_angle_);
       break;
     case to_work: {
-      angle_ = sense_ > 0 ? 0 : kPi, turned_ = 0, slack_ = 1;
+      angle_ = sense_ > 0 ? 0 : kPi, turned_ = 0, slack_ = 1, snugs_ = false;
       const float drop = kStrandAt - kWindAt, taut = kLoose * strand_;
       radius_ = std::sqrt(std::max(kNearest * kNearest, taut * taut - height_ * height_ - drop * drop));
       // The needle holder comes from far behind: nothing of it touches the strand on the way.
@@ -294,7 +294,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
     case lay:
       pulled_ = std::min(felt_, tail_felt_);
       // Both strands alike, and slowly.
-      glide_to(tip_ - line_ * (side_ * outward_ * 2e-3f) - Vec3{0, 3e-3f, 0}, hand_ + line_ * (side_ * outward_ * 2e-3f),
+      glide_to(tip_ - line_ * (tail_side() * 2e-3f) - Vec3{0, 3e-3f, 0}, hand_ + line_ * (tail_side() * 2e-3f),
                0.06f * how_.speed, forceps_angle_);
       break;
     case away:
@@ -357,10 +357,8 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const bool there = glide(pace * dt);
       // Hands that keep the strands taut here would open a throw below that has not tightened.
       if (throws_ > 1) tip_ = give(tip_, tail_felt_, tail_given_, dt), hand_ = give(hand_, felt_, strand_given_, dt);
-      if (there || steady_ > kTight || waited_ > 2 * kPatience) {
-        if (stage_ == lay_tail && snugs_) outward_ = -1;
+      if (there || steady_ > kTight || waited_ > 2 * kPatience)
         go(seen, stage_ == lift_tail ? lay_tail : snugs_ ? pull : drop_tail);
-      }
       break;
     }
     case drop_tail:
@@ -477,7 +475,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       const float easy = std::clamp(1 - std::min(felt_, tail_felt_) / kEasy, 0.0f, 1.0f);
       const float more = slack_of(seen, true) - slack_of(seen, false);
       const float even = stage_ == pull ? dt * std::clamp(kEvens * more, -kFastest, kFastest) * easy : 0.0f;
-      const Vec3 out = line_ * (side_ * outward_);
+      const Vec3 out = line_ * tail_side();
       tip_ += out * (pace(tail_felt_, felt_) + even), hand_ -= out * (pace(felt_, tail_felt_) - even);
       steady_ = std::min(tail_felt_, felt_) > 0.9f * how_.pull ? steady_ + dt : 0;
       const bool down = how_.lumen && throws_ == 1;
@@ -491,14 +489,12 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
         break;
       }
       if (stage_ == pull && (steady_ > (down ? kSeatedFirst : kSeated) || waited_ > 12 || lost))
-        go(seen, outward_ > 0 && look(seen).alternating() >= wanted_ ? hold : lay);
+        go(seen, !snugs_ && look(seen).alternating() >= wanted_ ? hold : lay);
       else if (stage_ == hold && (!keep_ || waited_ > 12)) go(seen, lay);
       break;
     }
     case lay:
-      if (!glide(dt)) break;
-      go(seen, outward_ > 0 ? release : drop_tail);
-      outward_ = 1, snugs_ = false;
+      if (glide(dt)) go(seen, snugs_ ? drop_tail : release);
       break;
     case release:
       if (move_jaw(holder, kHalfOpen, dt)) go(seen, away);

@@ -76,6 +76,7 @@ class ThreadTie {
   void feel(const Snapshot& seen);
   Vec3 give(Vec3 at, float felt, float& given, float dt) const;
   void place();
+  float tail_side() const { return snugs_ ? -side_ : side_; }  // on which it is pulled; the hands have crossed for a new throw
   float slack_of(const Snapshot& seen, bool tail) const;
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
   float tail_place(const Snapshot& seen, float wanted) const;
@@ -95,7 +96,7 @@ class ThreadTie {
   Vec3 line_;  // unit: from the strand's hand to the tail's, where side_ is +1
   Stage stage_ = done;
   int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0, throws_ = 0;
-  float side_ = 1, sense_ = 1, waited_ = 0, outward_ = 1;
+  float side_ = 1, sense_ = 1, waited_ = 0;
   int wanted_ = 0;  // throws that the knot shall have
   bool first_ = false, failed_ = false, keep_ = false;
   bool lost_ = false;                // the tail: it is taken and laid again first
