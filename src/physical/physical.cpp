@@ -136,7 +136,7 @@ std::span<const uint32_t> faces_of(const SurfaceSearch& k, uint32_t node, Vec3 p
 
 // Nodes near the surface: each gets the nearest point of the wall, on the side where it was. Neighbors share a point of the
 // coupling, because every point answers every other.
-void find_contacts(const Model& m, const State& s, Scratch& k) {
+void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped) {
   const Surface& surface = surface_of(m, s);
   const float d = m.thread.material.diameter, r = 0.5f * d, h = m.wall.step;
   const float far_move = m.thread.max_move * d * static_cast<float>(m.thread.substeps);
@@ -160,7 +160,10 @@ void find_contacts(const Model& m, const State& s, Scratch& k) {
       c.point = k.contact[group].point;
       ++shared;
     } else {
-      if (k.point.size() >= thread::kMaxSoftPoints) return;
+      if (k.point.size() >= thread::kMaxSoftPoints) {
+        ++dropped;
+        return;
+      }
       wall::Weights up = wall::weights(m.wall, s.wall.topology, foot.point), middle = up;
       up.zeta = 1, middle.zeta = 0;
       const float half = distance(wall::place(up, s.wall.motion), wall::place(middle, s.wall.motion));
@@ -377,7 +380,7 @@ void step_thread(const Model& m, State& s, Scratch& k, const Hands& hands) {
   }
   const size_t holes = k.point.size();
   for (thread::Eyelet& e : t.eyelet) e.point = awake.point_of[e.point];
-  if (m.surface_contact) find_contacts(m, s, k);
+  if (m.surface_contact) find_contacts(m, s, k, t.overflow);
   k.coupling.set_points(m.wall, s.wall.topology, k.point, k.offset);
   k.coupling.begin(m.wall, s.wall);
   for (size_t i = 0; i < k.contact.size(); ++i) k.contact[i].offset = k.foot[i].at - k.coupling.at[k.contact[i].point];

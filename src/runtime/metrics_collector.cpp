@@ -294,6 +294,7 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v["ticks"] = static_cast<double>(result.ticks);
   v.try_emplace("surgeon_retries", 0);
   v.try_emplace("surgeon_done", 0);
+  v.try_emplace("contacts_dropped", 0);
 
   result.solver_ms = percentiles_of(solver_ms_);
   result.tick_ms = percentiles_of(tick_ms_);

@@ -80,7 +80,8 @@ Json json_of(const RunResult& r) {
                            "order_errors",
                            "state_valid",
                            "surgeon_retries",
-                           "surgeon_done"})
+                           "surgeon_done",
+                           "contacts_dropped"})
     j[name] = number_json(value(r, name));
   j["events"] = r.events.empty() ? Json::object() : Json(r.events);
   j["faults"] = r.faults.empty() ? Json::object() : Json(r.faults);
@@ -263,6 +264,8 @@ std::string run_summary(const RunResult& r, bool judged) {
                        s.suture + 1, s.points, s.throws(), s.throws() == 1 ? "" : "s", s.right, s.left, s.tension,
                        s.finished ? "" : ", not cut off");
   for (const auto& [name, count] : r.faults) out += fmt::format("  fault: {} ({} x)\n", name, count);
+  if (const double dropped = value(r, "contacts_dropped"); dropped > 0)
+    out += fmt::format("  warning: {:.0f} contacts found no room; what touched there could pass through\n", dropped);
   const double retries = value(r, "surgeon_retries");
   out += fmt::format("  end: {}{}; state {:016x}\n", r.ended,
                      retries > 0 ? fmt::format(", {} {}", retries, retries == 1 ? "retry" : "retries") : "", r.state_hash);

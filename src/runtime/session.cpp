@@ -82,6 +82,7 @@ class Run {
     if (enough_) result.ended = "stopped by callback";
     if (result.interrupted) result.ended = "interrupted";
     if (!metrics_.valid()) result.ended = "invalid state";
+    result.value["contacts_dropped"] = dropped_contacts(*state_);
     metrics_.finish(seen_, result);
   }
 

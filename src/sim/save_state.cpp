@@ -183,6 +183,10 @@ bool state_is_valid(const Model& built, const State& state, float limit) {
   return true;
 }
 
+uint32_t dropped_contacts(const State& state) {
+  return state.physical.world.thread.overflow + state.physical.world.bodies.overflow;
+}
+
 double kinetic_energy(const Model& built, const State& state) {
   const Model& model = current_model(built, state);
   double e = 0;

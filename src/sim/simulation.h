@@ -59,5 +59,8 @@ struct SimulationUnstable : std::runtime_error {
 // True when nothing in the state is NaN or infinite and no particle is further than `limit` meters from the origin.
 bool state_is_valid(const Model& model, const State& state, float limit = 1.0f);
 double kinetic_energy(const Model& model, const State& state);  // [J]
+// Contacts of thread and instruments that found no room in a list, over the whole run: what touched there could pass through.
+// Physical mechanics; 0 with guided ones.
+uint32_t dropped_contacts(const State& state);
 
 }  // namespace catgut

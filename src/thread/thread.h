@@ -102,7 +102,7 @@ struct State {
   std::vector<Eyelet> eyelet;  // by segment; at most one in a segment
   Columns3 listed;             // [m] positions of the nodes when the pairs were listed
   float travel = 0;            // [m] motion of the tools since then; huge: the list is outdated
-  uint32_t overflow = 0;       // pairs dropped because the list was full
+  uint32_t overflow = 0;       // pairs, or contacts with something soft, dropped because a list was full
   uint32_t refreshes = 0;
 
   size_t nodes() const { return x.x.size(); }

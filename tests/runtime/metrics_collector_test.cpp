@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "procedure/scene_fields.h"
+#include "runtime/report.h"
 
 namespace catgut {
 namespace {
@@ -203,6 +204,16 @@ TEST(MetricsCollector, faults_by_name_ends_in_hand_and_the_needle) {
   EXPECT_EQ(r.faults, (std::map<std::string, uint64_t>{{"too_few_throws", 1}, {"wrong_body", 2}}));
   EXPECT_EQ(r.value["held_ends"], 2);
   EXPECT_EQ(r.value["needle_detached"], 1);
+}
+
+// What a full list left out is not physics: the report says so, and is silent otherwise.
+TEST(MetricsCollector, contacts_that_found_no_room_are_reported) {
+  Judged run;
+  RunResult r = run.result();
+  EXPECT_EQ(run_summary(r).find("found no room"), std::string::npos);
+  r.value["contacts_dropped"] = 3;
+  EXPECT_NE(run_summary(r).find("warning: 3 contacts found no room"), std::string::npos) << run_summary(r);
+  EXPECT_NE(run_json(r).find("\"contacts_dropped\": 3"), std::string::npos);
 }
 
 TEST(SessionMetrics, the_path_and_force_of_every_hand_count) {

@@ -204,6 +204,21 @@ TEST(Thread, touches_a_rod_however_much_thread_lies_in_turns) {
   EXPECT_NEAR(rod.force_a.y + rod.force_b.y, -0.2f, 0.01f) << "the rod bears both weights";
 }
 
+// Turns too near to each other for the list. What is left out is counted.
+TEST(Thread, counts_the_pairs_that_its_list_had_no_room_for) {
+  std::vector<Vec3> path;
+  for (int i = 0; i < 1000; ++i) {
+    const float angle = 0.25f * static_cast<float>(i);
+    path.push_back({2e-3f * std::cos(angle), 0.25e-3f / 6.2831853f * angle, 2e-3f * std::sin(angle)});
+  }
+  State state = make_state(path);
+  Stepper stepper(state.nodes());
+  Surroundings around;
+  stepper.step(plain(), state, around);
+  EXPECT_EQ(state.key.size(), pair_capacity(path.size()));
+  EXPECT_GT(state.overflow, 0u);
+}
+
 TEST(Thread, slides_down_a_slope_steeper_than_its_friction_only) {
   for (const float slope : {0.25f, 0.35f}) {
     Settings settings = plain();
