@@ -363,9 +363,8 @@ const std::vector<ResultName>& result_names() {
         {"surgeon_retries", "", "bites, grasps, throws and cuts that the surgeon tried again"},
         {"surgeon_done", "", "1 if the surgeon finished in time and did not give up"},
         {"contacts_dropped", "",
-         "contacts of thread and instruments that found no room in a list: what touched there could pass through; 0 with "
-         "guided "
-         "mechanics"},
+         "contacts of thread and instruments that found no room in a list; what touched there could pass through. 0 with "
+         "guided mechanics"},
     };
     for (int k = 0; k < static_cast<int>(EventKind::count_); ++k) {
       const std::string name = event_name(static_cast<EventKind>(k));
