@@ -356,7 +356,7 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   node_listed.reserve(nodes), wall_listed.reserve(2 * columns), center.reserve(faces), radius.reserve(faces);
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
-  box.resize(faces);
+  near.reserve(2 * faces), box.resize(faces);
   lip_patch.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes),
       node_seen.reserve(nodes), close.reserve(nodes), close_face.reserve(kClose * nodes);
 }
@@ -477,26 +477,26 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
       radius = std::max(radius, distance(center, mid(s, c.column[i])) + length(director(s, c.column[i])));
     k.center[f] = center, k.radius[f] = radius;
   }
-  // Blocks of eight nodes share a sphere.
+  // Blocks of eight nodes share a sphere; thread that was cut is two threads, which may lie anywhere.
   k.node_first.clear(), k.node_face.clear();
   constexpr size_t kBlock = 8;
-  std::array<uint32_t, 256> near{};
-  for (size_t b = 0; b < nodes; b += kBlock) {
-    const size_t end = std::min(nodes, b + kBlock);
+  for (size_t b = 0, end = 0; b < nodes; b = end) {
+    end = b + 1;
+    while (end < std::min(nodes, b + kBlock) && !thread.broken[end - 1]) ++end;
     Vec3 center{};
     for (size_t i = b; i < end; ++i) center += thread.x.at(i) / static_cast<float>(end - b);
     float radius = 0;
     for (size_t i = b; i < end; ++i) radius = std::max(radius, distance(center, thread.x.at(i)));
-    size_t count = 0;
+    k.near.clear();
     for (uint32_t f = 0; f < faces; ++f) {
       const float reach = radius + k.radius[f] + k.margin;
-      if (length2(k.center[f] - center) < reach * reach && count < near.size()) near[count++] = f;
+      if (length2(k.center[f] - center) < reach * reach) k.near.push_back(f);
     }
     for (size_t i = b; i < end; ++i) {
       k.node_first.push_back(static_cast<uint32_t>(k.node_face.size()));
-      for (size_t j = 0; j < count; ++j) {
-        const float reach = k.radius[near[j]] + k.margin;
-        if (length2(k.center[near[j]] - thread.x.at(i)) < reach * reach) k.node_face.push_back(near[j]);
+      for (const uint32_t f : k.near) {
+        const float reach = k.radius[f] + k.margin;
+        if (length2(k.center[f] - thread.x.at(i)) < reach * reach) k.node_face.push_back(f);
       }
     }
   }

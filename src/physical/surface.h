@@ -88,6 +88,7 @@ struct SurfaceSearch {
   float margin = 2e-3f;  // [m]
   std::vector<Vec3> node_listed, wall_listed;
   std::vector<uint32_t> node_first, node_face;      // per thread node
+  std::vector<uint32_t> near;                       // of a block of nodes
   std::vector<uint32_t> column_first, column_face;  // per column: faces of other parts of the wall
   std::vector<Vec3> center;                         // [m] per face
   std::vector<float> radius;
