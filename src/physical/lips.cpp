@@ -1,24 +1,115 @@
 // SPDX-License-Identifier: Apache-2.0
 // physical/lips: contacts of the wall with itself. Declared in physical/surface.h.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <span>
 
 #include "physical/surface.h"
 
 namespace catgut::physical {
 namespace {
 
+constexpr float kDeep = 1e-3f;     // [m] a point so far inside was never outside
+constexpr float kApart = 1.3e-3f;  // [m] a point so far from a face has no contact with it
+constexpr float kTurned = 0.5f;    // cosine to the last normal: less is another side
+constexpr float kRound = 0.3e-3f;  // [m] beyond a border
+// Grooves.
+constexpr float kTouching = 0.1e-3f;  // [m] a point so near to one face is looked at for others
+constexpr float kLike = 0.95f;        // cosine between normals: more is one face
+constexpr float kSame = 1e-6f;        // [m]
+constexpr float kAdjoin = 20e-6f;     // [m] from the plane of a face to the border of the next one
+constexpr float kWide = 0.5e-3f;      // [m] along it
+
 Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
+
+// A point of the wall that may touch another part of it.
+struct Lip {
+  uint32_t column = 0;
+  float zeta = 0;
+  Vec3 at;                                // [m]
+  std::span<const wall::Contact> before;  // its contacts in the last step
+};
+
+// What was on one side of a wall stays there: the nearest side would let two edges hook into each other.
+bool is_other_side(const Lip& lip, const Foot& foot) {
+  return !lip.before.empty() && std::none_of(lip.before.begin(), lip.before.end(),
+                                             [&](const wall::Contact& k) { return dot(foot.normal, k.normal) >= kTurned; });
+}
+
+// The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face. A face of another
+// piece may stand steeply on it.
+bool is_behind(const wall::Model& m, const wall::State& s, const Surface& surface, const Lip& lip, const Foot& foot) {
+  if (surface.at_rim[lip.column]) return false;
+  const bool own = surface.piece[lip.column] == surface.piece[column_of(m, s, surface.patch[foot.patch].face)];
+  const Vec3 up = director(s, lip.column);
+  return dot(foot.normal, up) * lip.zeta > (own ? -0.3f : 0.3f) * length(up);
+}
+
+// Whether the faces of both feet make a groove: each lies in front of the other. Beyond the border of `b`, they do where that
+// adjoins `a`.
+bool make_groove(const Foot& a, const Foot& b) {
+  if (a.patch == b.patch || dot(b.facing, a.facing) > kLike) return false;
+  const Vec3 between = b.at - a.at;
+  if (!b.on_edge) return dot(between, a.facing) > -kSame && dot(between, b.facing) < kSame;
+  if (std::abs(dot(between, a.facing)) > kAdjoin || length2(between) > kWide * kWide || dot(b.inward, a.facing) <= 0)
+    return false;
+  return a.on_edge ? dot(a.inward, b.facing) > 0 : dot(between, b.facing) < kSame;
+}
+
+// In a groove a point touches two faces, in a pit three. With the nearest one alone it jumps to and fro between them, and both
+// walls shake. Returns how many feet there are. Rims are strips with edges all along: they have one.
+uint32_t find_groove(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, const Lip& lip,
+                     std::array<Foot, 3>& foot) {
+  uint32_t feet = 1;
+  if (lip.before.empty() || foot[0].gap > kTouching || surface.patch[foot[0].patch].side == 0 || surface.at_rim[lip.column])
+    return feet;
+  for (; feet < foot.size(); ++feet) {
+    Foot& next = foot[feet];
+    next.gap = kTouching;
+    for (uint32_t i = search.column_first[lip.column]; i < search.column_first[lip.column + 1]; ++i) {
+      const uint32_t face = search.column_face[i];
+      const FaceBox& box = box_of(m, s, search, face);
+      if (least_distance(box, lip.at, 0) > kDeep) continue;
+      for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+        if (surface.patch[q].side == 0 || least_distance(m, s, surface, search, box, q, lip.at) > kDeep ||
+            least_of_part(surface, search, q, lip.at) > kDeep)
+          continue;
+        Foot seen = nearest_on_patch(m, s, surface, q, lip.at, corners_in(search, q));
+        if (seen.gap < -kDeep || is_other_side(lip, seen) || is_behind(m, s, surface, lip, seen)) continue;
+        // Beyond its border a face of a groove counts as a plane: the other one continues behind it.
+        if (seen.on_edge) seen.gap = dot(lip.at - seen.at, seen.facing), seen.normal = seen.facing;
+        if (seen.gap >= next.gap || seen.gap < -kDeep) continue;
+        if (std::all_of(foot.begin(), foot.begin() + feet, [&](const Foot& f) { return make_groove(f, seen); })) next = seen;
+      }
+    }
+    if (next.gap >= kTouching) break;
+    if (foot[0].on_edge && foot[0].gap < 0) foot[0].gap = dot(lip.at - foot[0].at, foot[0].facing);
+  }
+  return feet;
+}
+
+// Which of its three contacts this one continues; `taken` has a bit for each that another foot has.
+uint32_t place_of(const Lip& lip, const Foot& foot, uint32_t taken) {
+  uint32_t free = ~taken, best = 3;
+  float most = kTurned;
+  for (const wall::Contact& old : lip.before) {
+    const uint32_t at = old.key & 3;
+    if (const float like = dot(old.normal, foot.normal); like >= most && !(taken >> at & 1)) most = like, best = at;
+    free &= ~(1u << at);
+  }
+  for (uint32_t at = 0; at < 3 && best == 3; ++at)
+    if (free >> at & 1) best = at;
+  for (uint32_t at = 0; at < 3 && best == 3; ++at)
+    if (!(taken >> at & 1)) best = at;
+  return best;
+}
 
 }  // namespace
 
 void find_lips(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, float friction,
                wall::ContactSolver& solver) {
-  constexpr float kDeep = 1e-3f;     // [m] a point so far inside was never outside
-  constexpr float kApart = 1.3e-3f;  // [m] a point so far from a face has no contact with it
   const uint32_t columns = wall::columns(s);
-  constexpr float kTurned = 0.5f;    // cosine to the last normal: less is another side
-  constexpr float kRound = 0.3e-3f;  // [m] beyond a border
   const bool fast = solver.reach + 4 * m.step * search.speed > kDeep;
   auto last = solver.last.begin();  // in the order of keys, as the points below
   for (uint32_t c = 0; c < columns; ++c) {
@@ -27,29 +118,30 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
     for (const float zeta : {-1.0f, 0.0f, 1.0f}) {
       if (zeta == 0 && !surface.at_rim[c]) continue;
       const wall::Weights w = wall::at_column(c, zeta);
-      const Vec3 p = wall::place(w, s.motion);
-      const Vec3 up = director(s, c);
       const float speed = length(wall::velocity(w, s.motion));
-      const uint64_t key = (uint64_t{1} << 62) | (uint64_t{c} << 2) | static_cast<uint64_t>(zeta + 1);
+      const uint64_t key = (uint64_t{1} << 62) | (uint64_t{c} << 4) | (static_cast<uint64_t>(zeta + 1) << 2);
       while (last != solver.last.end() && last->key < key) ++last;
-      const wall::Contact* before = last != solver.last.end() && last->key == key ? &*last : nullptr;
+      auto after = last;
+      while (after != solver.last.end() && after->key >> 2 == key >> 2) ++after;
+      const Lip lip{c, zeta, wall::place(w, s.motion), {last, after}};
       Foot best;
       best.gap = 1e9f;
+      const auto reach_of = [&](const FaceBox& box) {
+        return std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
+      };
       const auto look = [&](const FaceBox& box, uint32_t q) {
-        const float reach =
-            std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
-        if (least_distance(m, s, surface, search, box, q, p) > reach ||
-            least_of_part(surface, search, q, p) > std::abs(best.gap) + 1e-6f)
+        if (least_distance(m, s, surface, search, box, q, lip.at) > reach_of(box) ||
+            least_of_part(surface, search, q, lip.at) > std::abs(best.gap) + 1e-6f)
           return;
-        const Foot foot = nearest_on_patch(m, s, surface, q, p, corners_in(search, q));
+        const Foot foot = nearest_on_patch(m, s, surface, q, lip.at, corners_in(search, q));
         if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
         if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
-        // What was on one side of a wall stays there: the nearest side would let two edges hook into each other. An edge ends
-        // in a sharp border here; a real one is round, and what has come against it still meets it a little beyond.
-        if (before && dot(foot.normal, before->normal) < kTurned) return;
-        if (foot.gap < 0 && foot.on_edge && length2(cross(p - foot.at, foot.facing)) > (before ? kRound * kRound : 0)) return;
-        // The wall of the point itself lies behind it, outside the other part: the inner side for a point of a face.
-        if (!surface.at_rim[c] && dot(foot.normal, up) * zeta > -0.3f * length(up)) return;
+        if (is_other_side(lip, foot)) return;
+        // An edge ends in a sharp border here; a real one is round, and what has come against it still meets it a little
+        // beyond.
+        const float beyond = lip.before.empty() ? 0 : kRound;
+        if (foot.gap < 0 && foot.on_edge && length2(cross(lip.at - foot.at, foot.facing)) > beyond * beyond) return;
+        if (is_behind(m, s, surface, lip, foot)) return;
         best = foot;
       };
       // Most likely still the nearest: the others need not be searched.
@@ -59,10 +151,9 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       for (uint32_t i = search.column_first[c]; i < search.column_first[c + 1]; ++i) {
         const uint32_t face = search.column_face[i];
         const FaceBox& box = box_of(m, s, search, face);
-        const float far = least_distance(box, p, 0);
+        const float far = least_distance(box, lip.at, 0);
         nearest_box = std::min(nearest_box, far);
-        if (far > std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f)
-          continue;
+        if (far > reach_of(box)) continue;
         for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
           if (q != first) look(box, q);
       }
@@ -75,9 +166,19 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       if (best.gap > solver.reach &&
           best.gap > solver.reach + 2 * m.step * length(wall::velocity(w, s.motion) - wall::velocity(k.other, s.motion)))
         continue;
-      k.key = key;
-      k.normal = best.normal, k.gap = best.gap, k.friction = friction;
-      solver.contact.push_back(k);
+      k.friction = friction;
+      std::array<Foot, 3> foot{best};
+      const uint32_t feet = find_groove(m, s, surface, search, lip, foot);
+      uint32_t taken = 0;
+      for (uint32_t i = 0; i < feet; ++i) {
+        if (i > 0 && solver.contact.size() == solver.contact.capacity()) break;
+        const uint32_t at = place_of(lip, foot[i], taken);
+        taken |= 1u << at;
+        k.key = key + at;
+        k.other = wall::weights(m, s.topology, foot[i].point);
+        k.normal = foot[i].normal, k.gap = foot[i].gap;
+        solver.contact.push_back(k);
+      }
     }
     search.column_due[c] = search.moved + 0.5 * static_cast<double>(nearest_box - kApart);  // both may move
   }
