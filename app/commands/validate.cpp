@@ -25,7 +25,10 @@ std::string json_of(const std::vector<ValidationLine>& lines) {
   return all.dump(2) + "\n";
 }
 
-void print_line(const ValidationLine& l) {
+void print_line(const ValidationLine& l, bool with_heading) {
+  if (with_heading)
+    std::printf("%-4s  %-46s %11s %11s  %-9s %9s %9s  %s\n", "", "check", "expected", "got", "unit", "error", "tolerance",
+                "source");
   std::printf("%-4s  %-46s %11.5g %11.5g  %-9s %9.2g %9.2g  %s\n", l.ok ? "ok" : "FAIL", l.name.c_str(), l.expected, l.got,
               l.unit == "1" ? "" : l.unit.c_str(), l.error, l.tolerance, l.source.c_str());
   std::fflush(stdout);
@@ -35,11 +38,11 @@ int validate(const std::string& json, bool nightly, const std::string& only) {
   check_suffix(json, ".json", "--json");
   prepare_output(json);
   const bool table = json != "-";
-  if (table)
-    std::printf("%-4s  %-46s %11s %11s  %-9s %9s %9s  %s\n", "", "check", "expected", "got", "unit", "error", "tolerance",
-                "source");
-  const std::vector<ValidationLine> lines =
-      run_validation(table ? print_line : std::function<void(const ValidationLine&)>{}, nightly, only);
+  size_t shown = 0;
+  const auto show = [&](const ValidationLine& l) {
+    if (table) print_line(l, shown++ == 0);
+  };
+  const std::vector<ValidationLine> lines = run_validation(show, nightly, only);
   if (!json.empty()) write_output(json, json_of(lines));
   size_t failed = 0;
   for (const ValidationLine& l : lines) failed += !l.ok;

@@ -55,7 +55,7 @@ particles = 1403
     const int status = std::system(line.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, read_file(out), read_file(err)};
   }
-  // Bad input: code 2, nothing on standard output, one line on standard error that contains `part`.
+  // Bad input: code 2, and one line on standard error that contains `part`.
   void expect_refused(const std::string& arguments, const std::string& part) {
     const Outcome o = run_catgut(arguments);
     EXPECT_EQ(o.code, 2) << arguments << "\n" << o.err;

@@ -42,6 +42,8 @@ TEST_F(CommandLine, a_file_name_says_what_it_holds) {
 }
 
 TEST_F(CommandLine, bad_input_is_one_line_and_code_2) {
+  expect_refused("validate --only nonsense", "no group of checks begins so");
+  EXPECT_EQ(run_catgut("validate --only nonsense").out, "") << "no heading of a table that never comes";
   expect_refused("", "run without it");
   expect_refused("run purse_sting --headless", "did you mean \"purse_string\"?");
   expect_refused("run /no/such/file.toml", "there is no such scene");
