@@ -219,10 +219,12 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
     const bool all = faces.size() == k.search.node_first[i + 1] - k.search.node_first[i];
     if (all) close = {p, k.search.moved, r + far_move + kCloseBy, 0};
     else nearest_box = close.within - way_since(k.search, i, p);
-    for (const uint32_t face : faces) {
+    k.search.far.resize(faces.size());
+    for (size_t f = 0; f < faces.size(); ++f) {
+      const uint32_t face = faces[f];
       const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
       const float reach = memory ? 2 * k.search.margin : r + far_move + 1.5f * h * box.speed;
-      const float far = least_distance(box, p, 0);
+      const float far = k.search.far[f] = least_distance(box, p, 0);
       nearest_box = std::min(nearest_box, far);
       if (all && far < close.within) {
         if (close.count < kClose) k.search.close_face[kClose * i + close.count] = face;
@@ -260,9 +262,10 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
         return dot(normal, best.normal) >= 0.95f ||
                std::any_of(more.begin(), other, [&](const Foot& foot) { return dot(normal, foot.normal) >= 0.95f; });
       };
-      for (const uint32_t face : faces) {
+      for (size_t f = 0; f < faces.size(); ++f) {
+        if (k.search.far[f] > other->gap) continue;
+        const uint32_t face = faces[f];
         const FaceBox& box = box_of(m.wall, s.wall, k.search, face);
-        if (least_distance(box, p, 0) > other->gap) continue;
         for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
           const int side = surface.patch[q].side;
           const float useful = memory ? std::max(other->gap, d) : other->gap;  // in front of a face, or behind it in a fold

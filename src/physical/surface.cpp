@@ -356,7 +356,7 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   node_listed.reserve(nodes), wall_listed.reserve(2 * columns), center.reserve(faces), radius.reserve(faces);
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
-  near.reserve(2 * faces), box.resize(faces);
+  near.reserve(2 * faces), far.reserve(2 * faces), box.resize(faces);
   lip_patch.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes),
       node_seen.reserve(nodes), close.reserve(nodes), close_face.reserve(kClose * nodes);
 }

@@ -89,6 +89,7 @@ struct SurfaceSearch {
   std::vector<Vec3> node_listed, wall_listed;
   std::vector<uint32_t> node_first, node_face;      // per thread node
   std::vector<uint32_t> near;                       // of a block of nodes
+  std::vector<float> far;                           // [m] of a node: at least to each of its faces
   std::vector<uint32_t> column_first, column_face;  // per column: faces of other parts of the wall
   std::vector<Vec3> center;                         // [m] per face
   std::vector<float> radius;
