@@ -14,6 +14,8 @@ constexpr float kDeep = 1e-3f;     // [m] a point so far inside was never outsid
 constexpr float kApart = 1.3e-3f;  // [m] a point so far from a face has no contact with it
 constexpr float kTurned = 0.5f;    // cosine to the last normal: less is another side
 constexpr float kRound = 0.3e-3f;  // [m] beyond a border
+// Cosine between a face and the direction out of the point's own wall: more is behind it. Of its own piece, of another one.
+constexpr float kBehindOwn = -0.3f, kBehind = 0.3f;
 // Grooves.
 constexpr float kTouching = 0.1e-3f;  // [m] a point so near to one face is looked at for others
 constexpr float kLike = 0.95f;        // cosine between normals: more is one face
@@ -43,7 +45,7 @@ bool is_behind(const wall::Model& m, const wall::State& s, const Surface& surfac
   if (surface.at_rim[lip.column]) return false;
   const bool own = surface.piece[lip.column] == surface.piece[column_of(m, s, surface.patch[foot.patch].face)];
   const Vec3 up = director(s, lip.column);
-  return dot(foot.normal, up) * lip.zeta > (own ? -0.3f : 0.3f) * length(up);
+  return dot(foot.normal, up) * lip.zeta > (own ? kBehindOwn : kBehind) * length(up);
 }
 
 // Whether the faces of both feet make a groove: each lies in front of the other. Beyond the border of `b`, they do where that
@@ -119,7 +121,8 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       if (zeta == 0 && !surface.at_rim[c]) continue;
       const wall::Weights w = wall::at_column(c, zeta);
       const float speed = length(wall::velocity(w, s.motion));
-      const uint64_t key = (uint64_t{1} << 62) | (uint64_t{c} << 4) | (static_cast<uint64_t>(zeta + 1) << 2);
+      // States saved before grooves have 1 << 62 and other places of the bits: their contacts match none here.
+      const uint64_t key = (uint64_t{3} << 62) | (uint64_t{c} << 4) | (static_cast<uint64_t>(zeta + 1) << 2);
       while (last != solver.last.end() && last->key < key) ++last;
       auto after = last;
       while (after != solver.last.end() && after->key >> 2 == key >> 2) ++after;

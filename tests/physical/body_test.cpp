@@ -417,7 +417,8 @@ TEST(Needle, draws_its_thread_freely_through_two_walls_that_touch) {
 }
 
 // As before; then the needle comes back by a few millimeters and stays. The thread is slack, and lies in dents of both sheets
-// where they press on each other. They shook there with up to 0.19 m/s: a node in a groove touched one of its faces at a time.
+// where they press on each other. They shook there with 0.12 and 0.23 m/s: a node in a groove touched one of its faces at a
+// time.
 TEST(Needle, leaves_two_walls_that_touch_at_rest) {
   struct Way {
     float apart;
