@@ -159,19 +159,47 @@ TEST_F(StitchAtTheWindow, scissors_cut_by_mouse) {
   EXPECT_GE(desk.count(EventKind::tissue_snipped), 1u);
 }
 
-// F10 in the middle of the first stage, a clamp in the hand and one parked. The report says how far it came; the recording has
-// all of it, and its replay comes to the same state.
+// Report and recording of an operation that is left in its first stage.
+class AbortedFiles {
+ public:
+  AbortedFiles() { fs::create_directories(folder_); }
+  ~AbortedFiles() { fs::remove_all(folder_); }
+  void write(PlayOptions& options) const {
+    options.tutorial = false;
+    options.json = json_, options.live.record = recording_, options.live.record_at_once = true;
+  }
+  // The report says how far it came; the recording has all of it, and its replay comes to the same state.
+  void expect_first_stage_and_the_same_replay(size_t clamps) const {
+    const nlohmann::json report = nlohmann::json::parse(std::ifstream(json_));
+    EXPECT_EQ(report["procedure"]["finished"], false);
+    EXPECT_EQ(report["procedure"]["stages"][0]["name"], "clamp");
+    EXPECT_EQ(report["procedure"]["stages"][0]["state"], "active");
+    EXPECT_EQ(report["procedure"]["stages"][1]["state"], "waiting");
+    const Recording recording = read_recording(recording_);
+    EXPECT_FALSE(recording.truncated) << recording.fault;
+    size_t held = 0;
+    SessionHooks hooks;
+    hooks.on_tick = [&](const Snapshot& seen, const std::string&) {
+      held = 0;
+      for (const InstrumentView& i : seen.instrument) held += i.held == Held::tissue;
+    };
+    const ReplayResult again = replay_session(recording, recording_, true, 1, hooks);
+    EXPECT_FALSE(again.differs_at) << "tick " << again.differs_at.value_or(0);
+    EXPECT_EQ(held, clamps);
+  }
+
+ private:
+  fs::path folder_ = fs::path(testing::TempDir()) / ("catgut_aborted_" + std::to_string(getpid()));
+  std::string json_ = (folder_ / "report.json").string(), recording_ = (folder_ / "session.cgrec").string();
+};
+
+// F10 in the middle of the first stage, a clamp in the hand and one parked.
 TEST_F(StitchAtTheWindow, an_aborted_operation_is_reported_and_recorded) {
   XMouse desk(x_->display, 400, 1, "altemeier");
   if (!desk.ready()) GTEST_SKIP() << "no XTest here";
-  const fs::path folder = fs::path(testing::TempDir()) / ("catgut_aborted_" + std::to_string(getpid()));
-  fs::create_directories(folder);
-  const std::string json = (folder / "report.json").string(), file = (folder / "session.cgrec").string();
+  const AbortedFiles files;
   desk.lesson = "altemeier";
-  desk.prepare = [&](PlayOptions& options) {
-    options.tutorial = false;
-    options.json = json, options.live.record = file, options.live.record_at_once = true;
-  };
+  desk.prepare = [&](PlayOptions& options) { files.write(options); };
   Person me(desk);
   bool done = false, left = false;
   size_t parked = 0;
@@ -187,23 +215,7 @@ TEST_F(StitchAtTheWindow, an_aborted_operation_is_reported_and_recorded) {
   ASSERT_TRUE(done) << me.doing();
   EXPECT_TRUE(left);
   EXPECT_EQ(parked, 1u);
-  const nlohmann::json report = nlohmann::json::parse(std::ifstream(json));
-  EXPECT_EQ(report["procedure"]["finished"], false);
-  EXPECT_EQ(report["procedure"]["stages"][0]["name"], "clamp");
-  EXPECT_EQ(report["procedure"]["stages"][0]["state"], "active");
-  EXPECT_EQ(report["procedure"]["stages"][1]["state"], "waiting");
-  const Recording recording = read_recording(file);
-  EXPECT_FALSE(recording.truncated) << recording.fault;
-  size_t held = 0;
-  SessionHooks hooks;
-  hooks.on_tick = [&](const Snapshot& seen, const std::string&) {
-    held = 0;
-    for (const InstrumentView& i : seen.instrument) held += i.held == Held::tissue;
-  };
-  const ReplayResult again = replay_session(recording, file, true, 1, hooks);
-  EXPECT_FALSE(again.differs_at) << "tick " << again.differs_at.value_or(0);
-  EXPECT_EQ(held, 2u) << "the parked clamp, and the one in the hand";
-  fs::remove_all(folder);
+  files.expect_first_stage_and_the_same_replay(2);  // the parked clamp, and the one in the hand
 }
 
 // A user with a stylus in the right hand sees how far the tool is from where it should be, and moves on.
@@ -272,67 +284,133 @@ class Stylus {
   Quat turn_;
 };
 
-TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
-  XMouse desk(x_->display, 500, 1, "altemeier");
-  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
-  FakeHd fake(false);
-  desk.prepare = [](PlayOptions& options) {
+// Two simulated arms at a window; the right one has the stylus. The first action that does not succeed is remembered.
+class AtTheArms {
+ public:
+  AtTheArms(const std::string& display, const char* scene) : desk(display, 500, 1, scene) {
+    desk.prepare = [](PlayOptions& options) { connect(options); };
+  }
+  static void connect(PlayOptions& options) {
     options.live.haptics = "touch";
     options.live.say = [](const std::string&) {};
-  };
-  std::string stopped_at;
-  desk.sit([&] {
-    Stylus me(desk, fake);
-    const auto step = [&](const char* what, bool done) {
-      if (!done && stopped_at.empty()) stopped_at = what;
-      return done;
-    };
+  }
+  void sit(const std::function<void(Stylus&)>& work, bool teach = false) {
+    desk.sit(
+        [&] {
+          Stylus me(desk, fake_);
+          work(me);
+        },
+        teach);
+  }
+  bool step(const char* what, bool done) {
+    if (!done && stopped_at.empty()) stopped_at = what;
+    return done;
+  }
+  // The place of the rim toward the user, and `down` [m] below it.
+  Vec3 at_front(const Stylus& me, float down) const {
     const std::vector<uint32_t>& rim = desk.picture().rim[0];
     const uint32_t front = *std::max_element(rim.begin(), rim.end(), [&](uint32_t a, uint32_t b) {
       return desk.picture().particle_rest[a].z < desk.picture().particle_rest[b].z;
     });
-    const auto at_front = [&](float down) { return me.seen().particle[front] - Vec3{0, down, 0}; };
-    const auto jaws = [&](float above) {
-      Pose p = jaws_at(*rim_beside(desk.look().view, at_front(0), 0.01f, desk.picture(), me.seen()));
+    return me.seen().particle[front] - Vec3{0, down, 0};
+  }
+  Pose jaws(const Stylus& me, float above) const {
+    Pose p = jaws_at(*rim_beside(desk.look().view, at_front(me, 0), 0.01f, desk.picture(), me.seen()));
+    p.p += rotate(p.q, {0, 0, above});
+    return p;
+  }
+  bool take(Stylus& me, const char* kind) {
+    const auto instrument = [&] { return me.seen().tool[0].instrument; };
+    for (int i = 0; i < 8; ++i) {
+      if (instrument() >= 0 && desk.picture().instrument[static_cast<size_t>(instrument())].kind == kind) return true;
+      const int before = instrument();
+      desk.press("i");
+      if (!me.until([&] { return instrument() != before; })) return false;
+    }
+    return false;
+  }
+  bool clamp_the_rim(Stylus& me) {
+    return step("take a clamp", take(me, "allis")) && step("over the rim", me.go([&] { return jaws(me, 0.03f); }, 0.004f)) &&
+           step("close on the rim", me.grasp([&] { return jaws(me, 0); }));
+  }
+  bool park(Stylus& me) {
+    desk.press("k");
+    return step("park it", me.until([&] { return me.seen().tool[0].instrument < 0; }));
+  }
+
+  XMouse desk;
+  std::string stopped_at;
+
+ private:
+  FakeHd fake_{false};
+};
+
+TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
+  AtTheArms at(x_->display, "altemeier");
+  if (!at.desk.ready()) GTEST_SKIP() << "no XTest here";
+  at.sit([&](Stylus& me) {
+    float along = 0, above = 0.02f;
+    const auto tip = [&] {
+      const Vec3 place = at.at_front(me, kLine) + Vec3{along, 0, 0};
+      const auto spot = wall_under(at.desk.look().view, place, at.desk.picture(), me.seen());
+      return spot ? tip_on(*spot, above) : Pose{place, {}};
+    };
+    const auto pen = [&] { return me.seen().instrument[static_cast<size_t>(me.seen().tool[0].instrument)].pen; };
+    if (!at.clamp_the_rim(me) || !at.park(me) || !at.step("away", me.go([&] { return at.jaws(me, 0.05f); }, 0.02f)) ||
+        !at.step("take the pen", at.take(me, "cautery")) || !at.step("to the line", me.go(tip, 0.004f)))
+      return;
+    above = 0;
+    if (!at.step("touch the line", me.go(tip, 0.0025f)) ||
+        !at.step("switch it on", me.press(2, 2, [&] { return pen() == PenMode::cut; })))
+      return;
+    for (; along < 0.004f; along += 0.0005f) me.go(tip, 0.0025f);
+    at.step("switch it off", me.press(2, 2, [&] { return pen() == PenMode::off; }));
+    at.desk.press("k");
+    at.step("lay it down", me.until([&] { return me.seen().tool[0].instrument < 0; }));
+  });
+  EXPECT_EQ(at.stopped_at, "");
+  expect_clamp_and_score(at.desk);
+}
+
+TEST_F(StitchAtTheWindow, scissors_cut_by_simulated_arms) {
+  AtTheArms at(x_->display, "slit");
+  if (!at.desk.ready()) GTEST_SKIP() << "no XTest here";
+  at.sit([&](Stylus& me) {
+    float above = 0.03f;
+    const auto blades = [&] {
+      const auto rim = rim_beside(at.desk.look().view, at.at_front(me, 0), 0.01f, at.desk.picture(), me.seen());
+      Pose p = rim ? jaws_at(*rim) : me.seen().tool[0].hand;
       p.p += rotate(p.q, {0, 0, above});
       return p;
     };
-    float along = 0, above = 0.02f;
-    const auto tip = [&] {
-      const Vec3 place = at_front(kLine) + Vec3{along, 0, 0};
-      const auto spot = wall_under(desk.look().view, place, desk.picture(), me.seen());
-      return spot ? tip_on(*spot, above) : Pose{place, {}};
-    };
-    const auto instrument = [&] { return me.seen().tool[0].instrument; };
-    const auto take = [&](const char* kind) {
-      for (int i = 0; i < 8; ++i) {
-        if (instrument() >= 0 && desk.picture().instrument[static_cast<size_t>(instrument())].kind == kind) return true;
-        const int before = instrument();
-        desk.press("i");
-        if (!me.until([&] { return instrument() != before; })) return false;
-      }
-      return false;
-    };
-    const auto pen = [&] { return me.seen().instrument[static_cast<size_t>(instrument())].pen; };
-    if (!step("take a clamp", take("allis")) || !step("over the rim", me.go([&] { return jaws(0.03f); }, 0.004f)) ||
-        !step("close on the rim", me.grasp([&] { return jaws(0); })))
-      return;
-    desk.press("k");
-    if (!step("park it", me.until([&] { return instrument() < 0; })) ||
-        !step("away", me.go([&] { return jaws(0.05f); }, 0.02f)) || !step("take the pen", take("cautery")) ||
-        !step("to the line", me.go(tip, 0.004f)))
-      return;
-    above = 0;
-    if (!step("touch the line", me.go(tip, 0.0025f)) ||
-        !step("switch it on", me.press(2, 2, [&] { return pen() == PenMode::cut; })))
-      return;
-    for (; along < 0.004f; along += 0.0005f) me.go(tip, 0.0025f);
-    step("switch it off", me.press(2, 2, [&] { return pen() == PenMode::off; }));
-    desk.press("k");
-    step("lay it down", me.until([&] { return instrument() < 0; }));
+    if (!at.step("over the rim", me.go(blades, 0.004f))) return;
+    above = -0.006f;
+    at.step("blades on both sides", me.go(blades, 0.0025f));
+    at.step("close them", me.press(1, 1, [&] { return at.desk.count(EventKind::tissue_snipped) > 0; }));
   });
-  EXPECT_EQ(stopped_at, "");
-  expect_clamp_and_score(desk);
+  EXPECT_EQ(at.stopped_at, "");
+  EXPECT_GE(at.desk.count(EventKind::tissue_snipped), 1u);
+}
+
+// As by mouse, above.
+TEST_F(StitchAtTheWindow, an_operation_by_simulated_arms_is_aborted_reported_and_recorded) {
+  AtTheArms at(x_->display, "altemeier");
+  if (!at.desk.ready()) GTEST_SKIP() << "no XTest here";
+  const AbortedFiles files;
+  at.desk.lesson = "altemeier";
+  at.desk.prepare = [&](PlayOptions& options) { AtTheArms::connect(options), files.write(options); };
+  bool left = false;
+  at.sit(
+      [&](Stylus& me) {
+        if (!at.clamp_the_rim(me) || !at.park(me)) return;
+        at.step("away", me.go([&] { return at.jaws(me, 0.05f); }, 0.02f));
+        at.desk.press("F10");
+        left = at.desk.shows("results");
+      },
+      true);
+  EXPECT_EQ(at.stopped_at, "");
+  EXPECT_TRUE(left);
+  files.expect_first_stage_and_the_same_replay(1);
 }
 
 }  // namespace
