@@ -344,13 +344,14 @@ class SdlPad : public AtTheWindow {
     press(SDLK_F5);  // there is no button for it
   }
 
- private:
-  static void press(SDL_Keycode key) {
+  static void press(SDL_Keycode key) {  // of the keyboard
     SDL_Event e{};
     e.type = SDL_KEYDOWN;
     e.key.keysym.sym = key;
     SDL_PushEvent(&e);
   }
+
+ private:
   void do_it(const Act& act) override {
     if (!stick_) return;
     send(by_pad(act, look_, pad_));

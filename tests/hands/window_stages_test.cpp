@@ -218,6 +218,25 @@ TEST_F(StitchAtTheWindow, an_aborted_operation_is_reported_and_recorded) {
   files.expect_first_stage_and_the_same_replay(2);  // the parked clamp, and the one in the hand
 }
 
+TEST_F(StitchAtTheWindow, an_operation_by_gamepad_is_aborted_reported_and_recorded) {
+  SdlPad desk(400, "altemeier");
+  const AbortedFiles files;
+  desk.lesson = "altemeier";
+  desk.prepare = [&](PlayOptions& options) { files.write(options); };
+  Person me(desk);
+  bool done = false, left = false;
+  desk.sit(
+      [&] {
+        done = desk.plug_in() && me.take_instrument(0, "allis") && me.grasp_rim(0, 0) && me.park(0);
+        SdlPad::press(SDLK_F10);
+        left = desk.shows("results");
+      },
+      true);
+  ASSERT_TRUE(done) << me.doing();
+  EXPECT_TRUE(left);
+  files.expect_first_stage_and_the_same_replay(1);
+}
+
 // A user with a stylus in the right hand sees how far the tool is from where it should be, and moves on.
 class Stylus {
  public:
