@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -237,6 +238,20 @@ TEST_F(StitchAtTheWindow, an_operation_by_gamepad_is_aborted_reported_and_record
   files.expect_first_stage_and_the_same_replay(1);
 }
 
+constexpr float kBeside = -0.25f * kPi;  // [rad] between the clamps at 6 and 3 o'clock
+// The surgeon has secured the prolapse before the user sits down: the second stage begins with its four clamps.
+void begin_at_the_cut(PlayOptions& options) { options.tutorial = false, options.stage = "cut"; }
+size_t clamps_on_the_rim(const Snapshot& seen) {
+  size_t n = 0;
+  for (const InstrumentView& i : seen.instrument) n += i.place == InstrumentPlace::parked && i.held == Held::tissue;
+  return n;
+}
+void expect_a_cut(const AtTheWindow& desk, size_t clamps) {
+  EXPECT_EQ(clamps, 4u);
+  EXPECT_EQ(desk.lesson_run().stage, 1u) << "clamp, cut";
+  EXPECT_GE(desk.count(EventKind::wall_scored) + desk.count(EventKind::wall_cut_through), 1u);
+}
+
 // A user with a stylus in the right hand sees how far the tool is from where it should be, and moves on.
 class Stylus {
  public:
@@ -325,14 +340,15 @@ class AtTheArms {
     if (!done && stopped_at.empty()) stopped_at = what;
     return done;
   }
-  // The place of the rim toward the user, and `down` [m] below it.
-  Vec3 at_front(const Stylus& me, float down) const {
+  // A place of the rim, in this direction from its middle, and `down` [m] below it.
+  Vec3 on_rim(const Stylus& me, Vec3 direction, float down) const {
     const std::vector<uint32_t>& rim = desk.picture().rim[0];
-    const uint32_t front = *std::max_element(rim.begin(), rim.end(), [&](uint32_t a, uint32_t b) {
-      return desk.picture().particle_rest[a].z < desk.picture().particle_rest[b].z;
+    const uint32_t found = *std::max_element(rim.begin(), rim.end(), [&](uint32_t a, uint32_t b) {
+      return dot(desk.picture().particle_rest[a], direction) < dot(desk.picture().particle_rest[b], direction);
     });
-    return me.seen().particle[front] - Vec3{0, down, 0};
+    return me.seen().particle[found] - Vec3{0, down, 0};
   }
+  Vec3 at_front(const Stylus& me, float down) const { return on_rim(me, {0, 0, 1}, down); }
   Pose jaws(const Stylus& me, float above) const {
     Pose p = jaws_at(*rim_beside(desk.look().view, at_front(me, 0), 0.01f, desk.picture(), me.seen()));
     p.p += rotate(p.q, {0, 0, above});
@@ -357,6 +373,24 @@ class AtTheArms {
     return step("park it", me.until([&] { return me.seen().tool[0].instrument < 0; }));
   }
 
+  // The pen, 4 mm along the line, on and off.
+  bool score(Stylus& me, Vec3 direction = {0, 0, 1}) {
+    float along = 0, above = 0.02f;
+    const auto tip = [&] {
+      const Vec3 place = on_rim(me, direction, kLine) + Vec3{direction.z, 0, -direction.x} * along;
+      const auto spot = wall_under(desk.look().view, place, desk.picture(), me.seen());
+      return spot ? tip_on(*spot, above) : Pose{place, {}};
+    };
+    const auto pen = [&] { return me.seen().instrument[static_cast<size_t>(me.seen().tool[0].instrument)].pen; };
+    if (!step("take the pen", take(me, "cautery")) || !step("to the line", me.go(tip, 0.004f))) return false;
+    above = 0;
+    if (!step("touch the line", me.go(tip, 0.0025f)) ||
+        !step("switch it on", me.press(2, 2, [&] { return pen() == PenMode::cut; })))
+      return false;
+    for (; along < 0.004f; along += 0.0005f) me.go(tip, 0.0025f);
+    return step("switch it off", me.press(2, 2, [&] { return pen() == PenMode::off; }));
+  }
+
   XMouse desk;
   std::string stopped_at;
 
@@ -368,27 +402,33 @@ TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
   AtTheArms at(x_->display, "altemeier");
   if (!at.desk.ready()) GTEST_SKIP() << "no XTest here";
   at.sit([&](Stylus& me) {
-    float along = 0, above = 0.02f;
-    const auto tip = [&] {
-      const Vec3 place = at.at_front(me, kLine) + Vec3{along, 0, 0};
-      const auto spot = wall_under(at.desk.look().view, place, at.desk.picture(), me.seen());
-      return spot ? tip_on(*spot, above) : Pose{place, {}};
-    };
-    const auto pen = [&] { return me.seen().instrument[static_cast<size_t>(me.seen().tool[0].instrument)].pen; };
     if (!at.clamp_the_rim(me) || !at.park(me) || !at.step("away", me.go([&] { return at.jaws(me, 0.05f); }, 0.02f)) ||
-        !at.step("take the pen", at.take(me, "cautery")) || !at.step("to the line", me.go(tip, 0.004f)))
+        !at.score(me))
       return;
-    above = 0;
-    if (!at.step("touch the line", me.go(tip, 0.0025f)) ||
-        !at.step("switch it on", me.press(2, 2, [&] { return pen() == PenMode::cut; })))
-      return;
-    for (; along < 0.004f; along += 0.0005f) me.go(tip, 0.0025f);
-    at.step("switch it off", me.press(2, 2, [&] { return pen() == PenMode::off; }));
     at.desk.press("k");
     at.step("lay it down", me.until([&] { return me.seen().tool[0].instrument < 0; }));
   });
   EXPECT_EQ(at.stopped_at, "");
   expect_clamp_and_score(at.desk);
+}
+
+// Mouse and gamepad: stages_test, in lock step.
+TEST_F(StitchAtTheWindow, an_operation_is_resumed_at_its_cut_by_simulated_arms) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  AtTheArms at(x_->display, "altemeier");
+  if (!at.desk.ready()) GTEST_SKIP() << "no XTest here";
+  at.desk.lesson = "altemeier";
+  at.desk.prepare = [](PlayOptions& options) { AtTheArms::connect(options), begin_at_the_cut(options); };
+  size_t clamps = 0;
+  at.sit(
+      [&](Stylus& me) {
+        clamps = clamps_on_the_rim(me.seen());
+        if (at.step("away", me.go([&] { return at.jaws(me, 0.05f); }, 0.02f)))
+          at.score(me, {std::cos(kBeside), 0, -std::sin(kBeside)});
+      },
+      true);
+  EXPECT_EQ(at.stopped_at, "");
+  expect_a_cut(at.desk, clamps);
 }
 
 TEST_F(StitchAtTheWindow, scissors_cut_by_simulated_arms) {
