@@ -17,9 +17,14 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
   text(kAccent, "Profiler (F3)");
   ImGui::SameLine();
   if (m.particles == 0) text(kQuiet, "measured while time runs: Esc");
-  else
-    text(kQuiet, fmt::format("{} particles ({} thread), {} clusters, {} contacts, {} dropped ticks", m.particles,
-                             m.thread_particles, m.clusters, m.contacts, v.status->late));
+  else {
+    const std::string mechanics = m.physical ? fmt::format("thread, {} awake), {} columns of the wall", m.awake, m.columns)
+                                             : fmt::format("thread), {} clusters", m.clusters);
+    text(kQuiet, fmt::format("{} particles ({} {}, {} contacts, {} dropped ticks", m.particles, m.thread_particles, mechanics,
+                             m.contacts, v.status->late));
+    if (m.without_room > 0)
+      bad_text(fmt::format("{} contacts found no room: what touched there could pass through", m.without_room));
+  }
   float most = 0.05f, all = 0;
   for (float ms : m.stage_ms) most = std::max(most, ms), all += ms;
   if (ImGui::BeginTable("inside", 2, ImGuiTableFlags_SizingFixedFit)) {
@@ -35,9 +40,8 @@ Choice developer_panel(const WorkView& v, bool can_touch) {
       ImGui::Dummy({1.2f * em(), em()});
     }
     ImGui::TableNextColumn();
-    text(kQuiet, "max constraint force by type");
-    for (size_t k = 0; k < m.peak_n.size(); ++k)
-      text(fmt::format("{:<16}{:8.3f} N  of {}", force_name(static_cast<ForceKind>(k)), m.peak_n[k], m.constraints[k]));
+    text(kQuiet, "max force by type");
+    for (const ForceMeasure& f : m.force) text(fmt::format("{:<19}{:8.3f} N  of {}", f.name, f.peak_n, f.count));
     gap(0.3f);
     text(kQuiet, can_touch ? "parameters" : "parameters (Esc to edit)");
     // A slider that is being dragged keeps its own value until release: every change rebuilds the model.

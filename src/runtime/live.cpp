@@ -191,7 +191,7 @@ void Live::Work::tick(bool let_in) {
   if (fresh > 0) published.moved_ns = fresh, published.began_ns = began_ns, published.ready_ns = 0;
   if (watch) {
     measure(*model, *state, published.measures);
-    published.measures.contacts = times.contacts;
+    if (!published.measures.physical) published.measures.contacts = times.contacts;
     for (size_t k = 0; k < times.ms.size(); ++k) {  // smoothed for display
       float& ms = published.measures.stage_ms[k];
       ms += 0.05f * (static_cast<float>(times.ms[k]) - ms);

@@ -11,39 +11,66 @@
 
 namespace catgut {
 
-const char* force_name(ForceKind kind) {
-  static constexpr const char* kName[] = {"thread", "tool and needle", "attachment", "needle track", "seam"};
-  static_assert(sizeof(kName) / sizeof(kName[0]) == static_cast<size_t>(ForceKind::count_));
-  return kind < ForceKind::count_ ? kName[static_cast<size_t>(kind)] : "unknown";
-}
+namespace {
 
-void measure(const Model& model, const State& state, Measures& out) {
+// Multipliers of the last substep; lambda / h^2 is a force.
+void measure_guided(const Model& model, const State& state, Measures& out) {
   const SolverModel& m = model.solver;
   const SolverState& s = state.solver;
-  out.particles = m.count;
-  out.thread_particles = m.count - m.tissue;
   out.clusters = m.shape.clusters;
   out.contacts = state.scratch.contacts;
-  out.peak_n.fill(0);
   const float inv_h2 = 1 / (m.h * m.h);
-  const auto row = [&](ForceKind kind, size_t count) -> float& {
-    out.constraints[static_cast<size_t>(kind)] = static_cast<uint32_t>(count);
-    return out.peak_n[static_cast<size_t>(kind)];
+  auto& [thread, tool, attachment, channel, seam] = out.force;
+  thread = {"thread"};
+  for (const Strand& strand : s.strand) {
+    thread.count += static_cast<uint32_t>(strand.tension.size());
+    for (float t : strand.tension) thread.peak_n = std::max(thread.peak_n, std::abs(t));
+  }
+  const auto all = [&](ForceMeasure& row, const char* name, const auto& list, auto force) {
+    row = {name, 0, static_cast<uint32_t>(list.size())};
+    for (const auto& entry : list) row.peak_n = std::max(row.peak_n, force(entry) * inv_h2);
   };
-  size_t pairs = 0;
-  for (const Strand& strand : s.strand) pairs += strand.tension.size();
-  float& thread = row(ForceKind::thread, pairs);
-  for (const Strand& strand : s.strand)
-    for (float t : strand.tension) thread = std::max(thread, std::abs(t));
-  float& tool = row(ForceKind::tool, s.weld.size());
-  for (const Weld& w : s.weld) tool = std::max(tool, length(w.lambda) * inv_h2);
-  float& attachment = row(ForceKind::attachment, s.attach.size());
-  for (const Attachment& a : s.attach) attachment = std::max(attachment, length(a.lambda) * inv_h2);
-  float& channel = row(ForceKind::channel, s.channel.size());
-  for (const NeedleTrackConstraint& c : s.channel)
-    channel = std::max({channel, length(c.lambda) * inv_h2, std::abs(c.drag_lambda) * inv_h2});
-  float& seam = row(ForceKind::seam, s.pin.size());
-  for (const Tether& p : s.pin) seam = std::max(seam, std::abs(p.lambda) * inv_h2);
+  all(tool, "tool and needle", s.weld, [](const Weld& w) { return length(w.lambda); });
+  all(attachment, "attachment", s.attach, [](const Attachment& a) { return length(a.lambda); });
+  all(channel, "needle track", s.channel,
+      [](const NeedleTrackConstraint& c) { return std::max(length(c.lambda), std::abs(c.drag_lambda)); });
+  all(seam, "seam", s.pin, [](const Tether& p) { return std::abs(p.lambda); });
+}
+
+// Impulses of the last step of the wall; an impulse over the step is a force.
+void measure_physical(const Model& model, const State& state, Measures& out) {
+  const physical::Model& m = model.physical->world;
+  const physical::State& s = state.physical.world;
+  out.columns = wall::columns(s.wall);
+  out.contacts = static_cast<uint32_t>(s.contact.size() + s.lip.size() + s.bodies.memory.size());
+  for (const physical::Sleep::Strand& k : s.sleep.strand) out.awake += k.asleep ? 0 : k.last - k.first + 1;
+  auto& [thread, hole, surface, lip, body] = out.force;
+  thread = {"thread", 0, static_cast<uint32_t>(s.thread.segments())};
+  for (size_t i = 0; i < s.thread.segments(); ++i)
+    if (!s.thread.broken[i]) thread.peak_n = std::max(thread.peak_n, std::abs(s.thread.tension[i]));
+  const auto all = [&](ForceMeasure& row, const char* name, const auto& list, float step, auto impulse) {
+    row = {name, 0, static_cast<uint32_t>(list.size())};
+    for (const auto& entry : list) row.peak_n = std::max(row.peak_n, impulse(entry) / step);
+  };
+  all(hole, "bite", s.hole, 1, [](const physical::Hole& h) { return length(h.load); });
+  all(surface, "thread on wall", s.contact, m.thread.substep * m.thread.substep,  // as in thread::Crossing
+      [](const thread::SoftContact& c) { return std::abs(c.normal_impulse); });
+  all(lip, "wall on wall", s.lip, m.wall.step, [](const wall::Contact& c) { return length(c.impulse); });
+  all(body, "instrument, needle", s.bodies.memory, m.wall.step, [](const physical::RowMemory& r) { return length(r.impulse); });
+}
+
+}  // namespace
+
+void measure(const Model& model, const State& state, Measures& out) {
+  const auto times = out.stage_ms;
+  out = {};
+  out.stage_ms = times;
+  out.particles = model.solver.count;
+  out.thread_particles = model.solver.count - model.solver.tissue;
+  out.without_room = dropped_contacts(state);
+  out.physical = model.physical != nullptr;
+  if (out.physical) measure_physical(model, state, out);
+  else measure_guided(model, state, out);
 }
 
 const std::array<LiveParameter, kLiveParameters>& live_parameters() {

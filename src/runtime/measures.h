@@ -13,22 +13,23 @@ struct Model;
 struct State;
 struct SceneSpec;
 
-// Multipliers by kind; lambda / h^2 is a force.
-enum class ForceKind : uint8_t {
-  thread,      // between two particles of the thread
-  tool,        // a tool on its hand, the needle in a jaw
-  attachment,  // tissue to the needle's tip, to a jaw, to the target of a closure
-  channel,     // the needle in its track
-  seam,        // tissue to tissue
-  count_
+// The largest force of one kind of interaction, and how many of them there are.
+struct ForceMeasure {
+  const char* name = "";
+  float peak_n = 0;  // [N] in the last step of the physics
+  uint32_t count = 0;
 };
-const char* force_name(ForceKind kind);
+constexpr size_t kMostForces = 5;
 
 struct Measures {
   std::array<float, static_cast<size_t>(Stage::count_)> stage_ms{};  // recent
-  uint32_t particles = 0, thread_particles = 0, clusters = 0, contacts = 0;
-  std::array<float, static_cast<size_t>(ForceKind::count_)> peak_n{};  // [N] in the last substep
-  std::array<uint32_t, static_cast<size_t>(ForceKind::count_)> constraints{};
+  bool physical = false;                                             // mechanics of the scene
+  uint32_t particles = 0, thread_particles = 0, contacts = 0;
+  uint32_t clusters = 0;      // guided mechanics
+  uint32_t columns = 0;       // physical mechanics: of the wall
+  uint32_t awake = 0;         // physical mechanics: thread particles that are stepped
+  uint32_t without_room = 0;  // contacts since the start that found no room: what touched there could pass through
+  std::array<ForceMeasure, kMostForces> force{};
 };
 // All but the times.
 void measure(const Model& model, const State& state, Measures& out);
