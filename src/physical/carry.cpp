@@ -6,23 +6,14 @@
 #include <array>
 #include <cmath>
 
-#include "core/sym3.h"
-#include "physical/body_internal.h"
 #include "physical/physical.h"
+#include "physical/rigid_fit.h"
 
 namespace catgut::physical {
 namespace {
 
-constexpr float kMoved = 0.5e-6f;  // [m] a strand is not moved for less: its nodes keep all of their bits
-constexpr int kTurns = 4;          // of a Newton iteration that doubles the digits of a turn each time
-
-// a x = b for a positive definite matrix; nothing where it is singular.
-Vec3 solved(const Sym3& a, Vec3 b) {
-  const Vec3 x{a.xx, a.xy, a.xz}, y{a.xy, a.yy, a.yz}, z{a.xz, a.yz, a.zz};
-  const float volume = dot(x, cross(y, z));
-  if (!(std::abs(volume) > 1e-30f)) return {};
-  return (cross(y, z) * b.x + cross(z, x) * b.y + cross(x, y) * b.z) / volume;
-}
+constexpr float kMoved = 0.5e-6f;   // [m] a strand is not moved for less: its nodes keep all of their bits
+constexpr float kColumn = 0.5e-3f;  // [m] nodes nearer than that to a column move as it does
 
 bool in_holes(const thread::State& t, const Sleep::Strand& strand) {
   return std::any_of(t.eyelet.begin(), t.eyelet.end(),
@@ -59,19 +50,11 @@ Carry carry_of(const SleepModel& model, std::span<const Sleep::Watched> watched,
     c.to = c.from;
     return c;
   }
-  for (int i = 0; i < kTurns; ++i) {
-    Sym3 inertia;
-    Vec3 moment{};
-    const auto add = [&](Vec3 was, Vec3 is) {
-      const Vec3 arm = rotate(c.turn, was);
-      inertia += identity(length2(arm)) + outer(arm, -1);
-      moment += cross(arm, is - arm);
-    };
+  c.turn = best_turn([&](auto visit) {
     each([&](Vec3 mid, Vec3 director, Vec3 mid_now, Vec3 director_now) {
-      add(mid - c.from, mid_now - c.to), add(director, director_now);
+      visit(mid - c.from, mid_now - c.to), visit(director, director_now);
     });
-    c.turn = turned(c.turn, solved(inertia, moment));
-  }
+  });
   each([&](Vec3 mid, Vec3 director, Vec3 mid_now, Vec3 director_now) {
     c.strain = std::max({c.strain, distance(c.place(mid), mid_now), distance(rotate(c.turn, director), director_now)});
   });
@@ -136,9 +119,23 @@ void carry(const Model& m, State& s, uint32_t strand, const Carry& by) {
   }
 }
 
-void turn_memory(State& s, uint32_t strand, const Carry& by) {
+void leave(const Model& m, State& s, uint32_t strand) {
   thread::State& t = s.thread;
   const Sleep::Strand& me = s.sleep.strand[strand];
+  const Carry by = carry_of(m.sleep, s.sleep.watched, s.wall, strand);
+  // What is left of the wall's motion is small but may be strained: a node goes with the columns nearest to it.
+  for (size_t i = me.first; i <= me.last && me.round > 0 && by.moves(); ++i) {
+    const Vec3 p = by.place(s.sleep.from[i]);
+    Vec3 sum{};
+    float all = 0;
+    for (const Sleep::Watched& w : s.sleep.watched) {
+      if (w.strand != strand || w.may_move >= m.sleep.nearby) continue;
+      const Vec3 at = by.place(w.mid);
+      const float far2 = length2(at - p) + kColumn * kColumn, part = 1 / (far2 * far2);
+      sum += (wall::vec3(s.wall.motion.x[2 * w.column]) - at) * part, all += part;
+    }
+    if (all > 0) t.x.set(i, p + sum / all), t.fine.set(i, {});
+  }
   if (by.turn == Quat{}) return;
   const auto turn = [&](Vec3& v) { v = rotate(by.turn, v); };
   for (size_t i = 0; i < t.key.size(); ++i)

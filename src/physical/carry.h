@@ -26,7 +26,8 @@ bool is_above(const thread::State& thread, size_t first, size_t last, const thre
 bool is_carried(const State& state, uint32_t strand);
 // Takes a strand along; it keeps its shape.
 void carry(const Model& model, State& state, uint32_t strand, const Carry& by);
-// Before it is stepped again: directions that contacts remember turn along.
-void turn_memory(State& state, uint32_t strand, const Carry& by);
+// Before a carried strand is stepped again: it lies in the wall as that is now, and directions that contacts remember turn
+// along.
+void leave(const Model& model, State& state, uint32_t strand);
 
 }  // namespace catgut::physical

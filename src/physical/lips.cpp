@@ -48,6 +48,44 @@ bool is_behind(const wall::Model& m, const wall::State& s, const Surface& surfac
   return dot(foot.normal, up) * lip.zeta > (own ? kBehindOwn : kBehind) * length(up);
 }
 
+// The nearest point of another part of the wall; a gap of 1e9 if there is none. known: the patch that had it in the last step,
+// or kNone. speed: of the lip [m/s]. reach [m]: how far it is sought, beside their motion. nearest_box [m]: becomes the least
+// distance to a face.
+Foot find_foot(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, const Lip& lip,
+               float speed, float reach, uint32_t known, float& nearest_box) {
+  Foot best;
+  best.gap = 1e9f;
+  const auto reach_of = [&](const FaceBox& box) {
+    return std::min(std::abs(best.gap), std::max(kDeep, reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
+  };
+  const auto look = [&](const FaceBox& box, uint32_t q) {
+    if (least_distance(m, s, surface, search, box, q, lip.at) > reach_of(box) ||
+        least_of_part(surface, search, q, lip.at) > std::abs(best.gap) + 1e-6f)
+      return;
+    const Foot foot = nearest_on_patch(m, s, surface, q, lip.at, corners_in(search, q));
+    if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
+    if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
+    if (is_other_side(lip, foot)) return;
+    // An edge ends in a sharp border here; a real one is round, and what has come against it still meets it a little beyond.
+    const float beyond = lip.before.empty() ? 0 : kRound;
+    if (foot.gap < 0 && foot.on_edge && length2(cross(lip.at - foot.at, foot.facing)) > beyond * beyond) return;
+    if (is_behind(m, s, surface, lip, foot)) return;
+    best = foot;
+  };
+  // Most likely still the nearest: the others need not be searched.
+  if (known != wall::kNone) look(box_of(m, s, search, surface.patch[known].face), known);
+  for (uint32_t i = search.column_first[lip.column]; i < search.column_first[lip.column + 1]; ++i) {
+    const uint32_t face = search.column_face[i];
+    const FaceBox& box = box_of(m, s, search, face);
+    const float far = least_distance(box, lip.at, 0);
+    nearest_box = std::min(nearest_box, far);
+    if (far > reach_of(box)) continue;
+    for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
+      if (q != known) look(box, q);
+  }
+  return best;
+}
+
 // Whether the faces of both feet make a groove: each lies in front of the other. Beyond the border of `b`, they do where that
 // adjoins `a`.
 bool make_groove(const Foot& a, const Foot& b) {
@@ -127,39 +165,8 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       auto after = last;
       while (after != solver.last.end() && after->key >> 2 == key >> 2) ++after;
       const Lip lip{c, zeta, wall::place(w, s.motion), {last, after}};
-      Foot best;
-      best.gap = 1e9f;
-      const auto reach_of = [&](const FaceBox& box) {
-        return std::min(std::abs(best.gap), std::max(kDeep, solver.reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
-      };
-      const auto look = [&](const FaceBox& box, uint32_t q) {
-        if (least_distance(m, s, surface, search, box, q, lip.at) > reach_of(box) ||
-            least_of_part(surface, search, q, lip.at) > std::abs(best.gap) + 1e-6f)
-          return;
-        const Foot foot = nearest_on_patch(m, s, surface, q, lip.at, corners_in(search, q));
-        if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
-        if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
-        if (is_other_side(lip, foot)) return;
-        // An edge ends in a sharp border here; a real one is round, and what has come against it still meets it a little
-        // beyond.
-        const float beyond = lip.before.empty() ? 0 : kRound;
-        if (foot.gap < 0 && foot.on_edge && length2(cross(lip.at - foot.at, foot.facing)) > beyond * beyond) return;
-        if (is_behind(m, s, surface, lip, foot)) return;
-        best = foot;
-      };
-      // Most likely still the nearest: the others need not be searched.
       uint32_t& known = search.lip_patch[3 * c + static_cast<uint32_t>(zeta + 1)];
-      const uint32_t first = known;
-      if (first != wall::kNone) look(box_of(m, s, search, surface.patch[first].face), first);
-      for (uint32_t i = search.column_first[c]; i < search.column_first[c + 1]; ++i) {
-        const uint32_t face = search.column_face[i];
-        const FaceBox& box = box_of(m, s, search, face);
-        const float far = least_distance(box, lip.at, 0);
-        nearest_box = std::min(nearest_box, far);
-        if (far > reach_of(box)) continue;
-        for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
-          if (q != first) look(box, q);
-      }
+      const Foot best = find_foot(m, s, surface, search, lip, speed, solver.reach, known, nearest_box);
       known = best.gap > 1e8f ? wall::kNone : best.patch;
       if (best.gap > 1e8f) continue;
       wall::Contact k;

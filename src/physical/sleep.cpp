@@ -3,21 +3,20 @@
 #include "physical/sleep.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
+#include "geometry/closest.h"
 #include "physical/carry.h"
 #include "physical/physical.h"
+#include "physical/quiet.h"
 
 namespace catgut::physical {
 namespace {
 
-constexpr float kQuietSpeed = 20e-3f;  // [m/s] when it is looked at: a swing that returns is not rest
-constexpr float kInBite = 40e-6f;      // [m] in a window, of thread in a bite
-constexpr size_t kBeside = 3;          // [nodes] beyond its holes
 constexpr uint32_t kLook = 50;         // [steps] after which it is looked at again within its window
 constexpr float kIntoDrape = 0.1e-3f;  // [m] by which the wall may press a tail into the drape
-constexpr float kSettled = 0.1e-3f;    // [m] in a window: rest of a strand that carries nothing
 constexpr float kAway = 12e-3f;        // [m] corners of a face that the thread may touch are nearer than this
 constexpr size_t kBlock = 8;           // nodes that share a bound
 
@@ -95,15 +94,6 @@ bool near(const thread::State& t, const Sleep::Strand& a, const Sleep::Strand& b
   });
 }
 
-// Thread that lies about unloaded unbends for a minute, ever more slowly, because its drag is high. Nothing depends on where.
-bool carries_nothing(const Model& m, const thread::State& t, const Sleep::Strand& strand) {
-  for (const thread::Eyelet& e : t.eyelet)
-    if (e.segment >= strand.first && e.segment < strand.last) return false;
-  for (size_t i = strand.first; i < strand.last; ++i)
-    if (std::abs(t.tension[i]) > m.sleep.steady) return false;
-  return true;
-}
-
 // Steps of a strand's window before its impulses are noted, and those in which they were noted so far.
 uint32_t steps_before(const SleepModel& m) { return m.window > kLook ? m.window - kLook : 0; }
 uint32_t steps_noted(const SleepModel& m, const Sleep::Strand& strand) {
@@ -117,7 +107,7 @@ void forget(Entries& entries, uint32_t strand) {
   std::erase_if(entries, [&](const auto& e) { return e.strand == strand; });
 }
 
-constexpr float kPart = 0.03f;     // of its distance from the strand, by which such a column may move
+constexpr float kPart = 0.3f;      // of the distance of its faces from the strand, by which a column may move
 constexpr float kWatched = 5e-3f;  // [m] beyond kAway: columns nearer than that are watched one by one
 
 // How far [m] a column is from being near a strand.
@@ -133,9 +123,9 @@ float away_from(const State& s, const Sleep::Strand& strand, uint32_t column) {
 
 void wake_one(const Model& m, State& s, uint32_t strand) {
   Sleep& z = s.sleep;
-  if (is_carried(s, strand)) turn_memory(s, strand, carry_of(m.sleep, z.watched, s.wall, strand));
+  if (is_carried(s, strand)) leave(m, s, strand);
   if (z.strand[strand].asleep) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
-  z.strand[strand].asleep = false, z.strand[strand].quiet = 0;
+  z.strand[strand].asleep = false, z.strand[strand].quiet = 0, z.strand[strand].round = 0;
   forget(z.load, strand), forget(z.watched, strand), forget(z.held, strand), forget(z.touched, strand);
 }
 
@@ -162,16 +152,40 @@ void list_strands(const Model& m, State& s) {
   z.from.resize(n), z.tension.resize(t.segments());
 }
 
+// How far [m] the faces of each column are from touching a strand; more than kWatched: 1.
+void find_room(const Model& m, const State& s, const Sleep::Strand& strand, std::vector<float>& room) {
+  const float off = 0.6f * m.wall.laminate.thickness + 0.5f * m.thread.material.diameter;  // of the mid-surface
+  room.assign(wall::columns(s.wall), 1);
+  for (const wall::BlockCorners& block : s.wall.topology.corners)
+    for (size_t lane = 0; lane < wall::kLanesOfBlock; ++lane) {
+      std::array<uint32_t, 4> column;
+      std::array<Vec3, 4> p;
+      for (size_t k = 0; k < 4; ++k) column[k] = block.column[k][lane], p[k] = mid(s.wall, column[k]);
+      const Vec3 middle = 0.25f * (p[0] + p[1] + p[2] + p[3]);
+      float around = 0, far = kWatched + off;
+      for (const Vec3 corner : p) around = std::max(around, distance(corner, middle));
+      any_block(s.thread, strand, [&](size_t first, size_t last, float reach) {
+        if (distance(s.thread.x.at(first), middle) - reach - around > far) return false;
+        for (size_t i = first; i <= last; ++i)
+          for (const size_t k : {size_t{1}, size_t{2}}) {
+            const Vec3 node = s.thread.x.at(i);
+            far = std::min(far, distance(node, closest_on_triangle(node, p[0], p[k], p[k + 1]).point));
+          }
+        return false;
+      });
+      if (far >= kWatched + off) continue;
+      for (const uint32_t c : column) room[c] = std::min(room[c], far - off);
+    }
+}
+
 // Where the wall near a strand is, and how far each column may move until it could touch the strand.
-void note_wall(const Model& m, State& s, uint32_t strand) {
+void note_wall(const Model& m, State& s, uint32_t strand, std::vector<float>& room) {
   Sleep& z = s.sleep;
   forget(z.watched, strand);
-  for (uint32_t c = 0; c < wall::columns(s.wall); ++c) {
-    const float far = away_from(s, z.strand[strand], c);
-    if (far > kWatched) continue;
-    z.watched.push_back(
-        {strand, c, mid(s.wall, c), director(s.wall, c), std::max({m.sleep.nearby, kPart * (far + kAway), 0.3f * far})});
-  }
+  find_room(m, s, z.strand[strand], room);
+  for (uint32_t c = 0; c < wall::columns(s.wall); ++c)
+    if (away_from(s, z.strand[strand], c) <= kWatched)
+      z.watched.push_back({strand, c, mid(s.wall, c), director(s.wall, c), std::max(m.sleep.nearby, kPart * room[c])});
 }
 
 // The columns of a strand's holes, at the beginning of its window.
@@ -184,29 +198,6 @@ void note_holes(const Model& m, State& s, uint32_t strand) {
     for (const uint32_t c : w.column)
       if (z.watched.size() < z.watched.capacity()) z.watched.push_back({strand, c, mid(s.wall, c), director(s.wall, c), 0});
   }
-}
-
-// Whether a strand has been quiet for its window, beside what a motion of the wall has done to it.
-bool is_quiet(const Model& m, const State& s, uint32_t k, const Carry& by) {
-  const Sleep& z = s.sleep;
-  const thread::State& t = s.thread;
-  const Sleep::Strand& strand = z.strand[k];
-  const float still = carries_nothing(m, t, strand) ? kSettled : m.sleep.still + 2 * by.strain;
-  const Vec3 speed = (by.to - by.from) / (static_cast<float>(strand.quiet) * m.wall.step);  // of the wall
-  const auto [low, high] = without_tails(t, strand);
-  // Thread in a bite creeps to and fro in its holes when the wall beside it is strained. Its tension says what that does.
-  size_t bite_low = strand.last + 1, bite_high = strand.first;
-  for (const thread::Eyelet& e : t.eyelet)
-    if (by.moves() && e.segment >= strand.first && e.segment < strand.last)
-      bite_low = std::min(bite_low, e.segment - std::min(kBeside, size_t{e.segment})), bite_high = e.segment + 1 + kBeside;
-  for (size_t i = strand.first; i <= strand.last; ++i) {
-    const bool tail = i < low || i > high, bite = i >= bite_low && i <= bite_high;
-    const float most = tail ? kSettled : bite ? std::max(still, kInBite) : still;
-    if (length2(t.position(i) - by.place(z.from[i])) > most * most || length(t.v.at(i) - speed) >= kQuietSpeed) return false;
-  }
-  for (size_t i = strand.first; i < strand.last; ++i)
-    if (std::abs(t.tension[i] - z.tension[i]) > m.sleep.steady + 0.05f * std::abs(z.tension[i])) return false;
-  return true;
 }
 
 bool sleeps_on(const Model& m, const State& s, uint32_t strand, std::span<const thread::Hold> holds,
@@ -284,9 +275,9 @@ void reserve(const State& s, Sleep& z) {
 void wake(const Model& m, State& s) {
   Sleep& z = s.sleep;
   for (uint32_t k = 0; k < z.strand.size(); ++k)
-    if (is_carried(s, k)) turn_memory(s, k, carry_of(m.sleep, z.watched, s.wall, k));
+    if (is_carried(s, k)) leave(m, s, k);
   if (z.any()) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
-  for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0;
+  for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0, k.round = 0;
   z.load.clear(), z.watched.clear(), z.held.clear(), z.touched.clear();
 }
 
@@ -315,7 +306,8 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
   for (const Sleep::Watched& w : z.watched) {
     const Carry& by = awake.carry[w.strand];
     const bool loads = by.moves() && w.may_move < m.sleep.nearby;
-    const float most = loads ? m.sleep.strain : w.may_move, most2 = most * most;
+    const float slack = z.strand[w.strand].round > 0 ? m.sleep.slack_strain : 0;
+    const float most = std::max(loads ? m.sleep.strain : w.may_move, slack), most2 = most * most;
     if (w.column >= wall::columns(s.wall) || length2(mid(s.wall, w.column) - by.place(w.mid)) > most2 ||
         length2(director(s.wall, w.column) - rotate(by.turn, w.director)) > most2)
       awake.disturbed[w.strand] = 1;
@@ -337,9 +329,13 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
       if (!z.strand[a].asleep || !z.strand[b].asleep || (!by_a.moves() && !by_b.moves())) continue;
       if (apart(awake.box[a], awake.box[b], m.thread.material.diameter + kToolMargin)) continue;
       const Vec3 at = 0.5f * (awake.box[a].low + awake.box[a].high);
-      if (length2(by_a.before(at) - by_b.before(at)) > m.sleep.nearby * m.sleep.nearby)
-        awake.disturbed[a] = awake.disturbed[b] = 1;
+      const float most = z.strand[a].round > 0 && z.strand[b].round > 0 ? m.sleep.slack_strain : m.sleep.nearby;
+      if (length2(by_a.before(at) - by_b.before(at)) > most * most) awake.disturbed[a] = awake.disturbed[b] = 1;
     }
+  for (uint32_t k = 0; k < n; ++k)  // a loop without slack would be taut now
+    if (const float round = z.strand[k].asleep ? z.strand[k].round : 0;
+        round > 0 && way_round(m, s, k) > round + m.sleep.longer)
+      awake.disturbed[k] = 1;
   for (uint32_t k = 0; k < n; ++k)
     if (z.strand[k].asleep && !sleeps_on(m, s, k, holds, tools, wall_moved, awake)) wake_one(m, s, k);
   for (bool more = true; more;) {
@@ -399,7 +395,8 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
     if (begun && ++strand.quiet <= m.sleep.window && strand.quiet % kLook != 0) continue;
     bool quiet = begun && is_quiet(m, s, k, {});
     if (begun && !quiet && only_in_wall(m, s, strand, holds, tools, hands.plane))
-      if (const Carry by = carry_of(m.sleep, z.watched, s.wall, k); by.strain <= m.sleep.strain) quiet = is_quiet(m, s, k, by);
+      if (const Carry by = carry_of(m.sleep, z.watched, s.wall, k); by.strain <= m.sleep.slack_strain)
+        quiet = (by.strain <= m.sleep.strain && is_quiet(m, s, k, by)) || is_slack_and_quiet(m, s, k, by);
     if (quiet && strand.quiet <= m.sleep.window) continue;
     awake.ready[k] = quiet, any |= quiet;
     if (quiet) continue;
@@ -423,9 +420,10 @@ bool find_quiet(const Model& m, State& s, const Hands& hands, std::span<const th
 
 void after_cut(const Model& m, State& s) {
   Sleep& z = s.sleep;
+  std::vector<float> room;
   if (std::any_of(z.load.begin(), z.load.end(), [&](const Sleep::Load& l) { return z.strand[l.strand].asleep; })) wake(m, s);
   for (uint32_t k = 0; k < z.strand.size(); ++k) {  // columns may have other numbers now
-    if (z.strand[k].asleep) note_wall(m, s, k);
+    if (z.strand[k].asleep) note_wall(m, s, k, room);
     else forget(z.watched, k), forget(z.load, k), z.strand[k].quiet = 0;
   }
 }
@@ -481,12 +479,12 @@ void fall_asleep(const Model& m, State& s, AwakeThread& awake, std::span<const t
     if (!awake.ready[strand] || noted == 0 || full(z.watched, columns) || full(z.held, holds.size()) ||
         full(z.touched, tools.size()))
       continue;
-    me.asleep = true;
+    me.asleep = true, me.round = is_slack(m, t, me) && has_knot(t, me) ? way_round(m, s, strand) : 0;
     if (strand < awake.far_due.size()) awake.far_due[strand] = -1;
     const auto has = [&](uint32_t node) { return node >= me.first && node <= me.last; };
     forget(z.watched, strand);
     const size_t remembered = z.watched.size();
-    note_wall(m, s, strand);
+    note_wall(m, s, strand, awake.room);
     for (size_t i = me.first; i <= me.last; ++i) z.from[i] = t.position(i);
     // The mean of its last steps: nodes beside each other take turns in pressing.
     awake.load_at.assign(2 * columns, wall::kNone);

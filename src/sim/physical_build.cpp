@@ -24,6 +24,8 @@ constexpr float kThreadDrag = 30;  // [1/s] on thread. At 0.1 m/s it is 0.15 N p
 // [N] with which tissue holds slack thread in a hole (an estimate). Without it the thread creeps into the lumen by its weight:
 // Coulomb friction needs tension.
 constexpr float kHoleGrip = 0.03f;
+// [N] of physical::SleepModel::slack. Off: of two runs of altemeier, none was whole with it (docs/physical.md, "Cost").
+constexpr float kSlack = 0;
 constexpr float kLyingForce = 0.05f;  // [N] with which the drape holds a needle that lies on it
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
@@ -164,6 +166,7 @@ std::shared_ptr<const PhysicalModel> make_physical(const Model& model, const wal
   made->world = physical::make_model(wall, thread_of(scene, step));
   made->world.surface_friction = scene.solver.friction_thread;
   made->world.lip_friction = scene.solver.friction_tissue;
+  made->world.sleep.slack = kSlack;
   made->drape.offset = model.solver.ground;
   made->drape.friction = scene.solver.friction_thread;
   made->start.wall = wall.state;
