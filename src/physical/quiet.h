@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// physical/quiet: whether a strand of the thread has been quiet for its window, and may sleep (physical/sleep). Reads what Sleep
-// noted at the beginning of the window, the thread and the wall.
+// physical/quiet: whether a strand of the thread has been quiet for its window, and may sleep (physical/sleep). Reads what
+// Sleep noted at the beginning of the window, the thread and the wall.
 #pragma once
 #include "physical/carry.h"
 

@@ -36,9 +36,8 @@ TEST(Measures, a_physical_scene_shows_its_thread_wall_and_forces) {
   EXPECT_GT(m.columns, 100u);
   EXPECT_EQ(m.without_room, 0u);
   const auto& thread = state->physical.world.thread;
-  EXPECT_FLOAT_EQ(peak(m, "thread"), std::abs(*std::max_element(thread.tension.begin(), thread.tension.end(), [](float a, float b) {
-                    return std::abs(a) < std::abs(b);
-                  })));
+  EXPECT_FLOAT_EQ(peak(m, "thread"), std::abs(*std::max_element(thread.tension.begin(), thread.tension.end(),
+                                                                [](float a, float b) { return std::abs(a) < std::abs(b); })));
   EXPECT_EQ(peak(m, "bite"), 0);
   EXPECT_EQ(peak(m, "seam"), -1) << "of guided mechanics";
   state->physical.world.thread.overflow = 2;
