@@ -195,7 +195,7 @@ void Operating::look(const Snapshot& seen) {
   stitched_ = static_cast<size_t>(std::count_if(seen.suture.begin(), seen.suture.end(), is_cut_off));
   if (stitched_ == seen.suture.size()) go(pull);
   else if (seen.topology.pieces > picture_.body.size()) go(take_holder);
-  else if (clamped_ == clamp_.size()) go(seen.tool[kAssistant].instrument < 0 ? to_assistant : take_pen);
+  else if (clamped_ == clamp_.size()) go(seen.tool[kAssistant].instrument < 0 ? off_rim : take_pen);
 }
 
 void Operating::act(const Snapshot& seen) {

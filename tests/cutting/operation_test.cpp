@@ -98,6 +98,23 @@ TEST(Operation, a_clamp_from_the_tray_is_parked_on_the_rim_and_holds_it) {
   EXPECT_EQ(f.seen.tool[0].instrument, static_cast<int>(pen));
 }
 
+// A state in which the second stage begins: the hand is still beside the clamp that it has parked, and has no room for the pen.
+TEST(Operation, a_surgeon_begins_with_the_cut_where_another_has_parked_the_last_clamp) {
+  const SceneSpec spec = small_scene();
+  Field f(spec);
+  const auto work = [&](const std::function<bool()>& until, uint64_t ticks) {
+    const std::unique_ptr<Surgeon> surgeon = scripted_surgeon(spec, picture_model(*f.model));
+    for (const uint64_t last = f.state->tick + ticks; !until() && !surgeon->done() && f.state->tick < last;) {
+      f.input = surgeon->operate(f.seen, f.model->dt);
+      f.tick();
+    }
+    EXPECT_TRUE(until()) << surgeon->doing();
+  };
+  work([&] { return f.of(EventKind::instrument_parked).size() == 4; }, 1200);
+  work([&] { return !f.of(EventKind::pen_activated).empty(); }, 600);
+  EXPECT_TRUE(f.of(EventKind::instrument_refused).empty());
+}
+
 // The hand slips off the line for a moment: a bridge of wall is left. Another body is in the field, as in the whole operation.
 TEST(Operation, a_bridge_left_in_the_circle_is_cut_before_the_specimen_is_lifted) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
