@@ -119,12 +119,12 @@ void carry(const Model& m, State& s, uint32_t strand, const Carry& by) {
   }
 }
 
-void leave(const Model& m, State& s, uint32_t strand) {
+void wake_carried(const Model& m, State& s, uint32_t strand) {
   thread::State& t = s.thread;
   const Sleep::Strand& me = s.sleep.strand[strand];
   const Carry by = carry_of(m.sleep, s.sleep.watched, s.wall, strand);
   // What is left of the wall's motion is small but may be strained: a node goes with the columns nearest to it.
-  for (size_t i = me.first; i <= me.last && me.round > 0 && by.moves(); ++i) {
+  for (size_t i = me.first; i <= me.last && me.loop > 0 && by.moves(); ++i) {
     const Vec3 p = by.place(s.sleep.from[i]);
     Vec3 sum{};
     float all = 0;

@@ -28,6 +28,6 @@ bool is_carried(const State& state, uint32_t strand);
 void carry(const Model& model, State& state, uint32_t strand, const Carry& by);
 // Before a carried strand is stepped again: it lies in the wall as that is now, and directions that contacts remember turn
 // along.
-void leave(const Model& model, State& state, uint32_t strand);
+void wake_carried(const Model& model, State& state, uint32_t strand);
 
 }  // namespace catgut::physical

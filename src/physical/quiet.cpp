@@ -112,7 +112,7 @@ float knot_change(const thread::State& t, const Sleep::Strand& strand, std::span
   return std::sqrt(sum / count);
 }
 
-float way_round(const Model& m, const State& s, uint32_t strand) {
+float loop_length(const Model& m, const State& s, uint32_t strand) {
   float way = 0;
   Vec3 first{}, last{};
   bool any = false;

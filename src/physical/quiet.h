@@ -18,6 +18,6 @@ bool has_knot(const thread::State& thread, const Sleep::Strand& strand);
 // tremble by themselves): thread that slips through it, or a knot that is drawn tight. No knot: 1.
 float knot_change(const thread::State& thread, const Sleep::Strand& strand, std::span<const Vec3> from);
 // [m] From hole to hole along the strand, and from the last one back to the first.
-float way_round(const Model& model, const State& state, uint32_t strand);
+float loop_length(const Model& model, const State& state, uint32_t strand);
 
 }  // namespace catgut::physical

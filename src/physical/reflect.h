@@ -58,7 +58,7 @@ constexpr void reflect(auto& a, Like<Needle> auto& n) {
 constexpr void reflect(auto& a, Like<Hole> auto& h) {
   a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);
 }
-constexpr void reflect(auto& a, Like<Sleep::Strand> auto& k) { a(k.first), a(k.last), a(k.quiet), a(k.asleep), a(k.round); }
+constexpr void reflect(auto& a, Like<Sleep::Strand> auto& k) { a(k.first), a(k.last), a(k.quiet), a(k.asleep), a(k.loop); }
 constexpr void reflect(auto& a, Like<Sleep::Load> auto& l) { a(l.strand), a(l.at), a(l.impulse); }
 constexpr void reflect(auto& a, Like<Sleep::Watched> auto& w) {
   a(w.strand), a(w.column), a(w.mid), a(w.director), a(w.may_move);

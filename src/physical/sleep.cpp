@@ -23,11 +23,7 @@ constexpr size_t kBlock = 8;           // nodes that share a bound
 Vec3 mid(const wall::State& w, uint32_t column) { return wall::vec3(w.motion.x[2 * column]); }
 Vec3 director(const wall::State& w, uint32_t column) { return wall::vec3(w.motion.x[2 * column + 1]); }
 
-float to_segment(Vec3 p, Vec3 a, Vec3 b) {
-  const Vec3 d = b - a;
-  const float d2 = length2(d), at = d2 > 0 ? std::clamp(dot(p - a, d) / d2, 0.0f, 1.0f) : 0.0f;
-  return distance(p, a + d * at);
-}
+float to_segment(Vec3 p, Vec3 a, Vec3 b) { return distance(p, lerp(a, b, closest_on_segment(p, a, b))); }
 
 // Calls visit(first node of a block, its last node, length of thread [m] from the first one to any other).
 template <typename Visit>
@@ -123,9 +119,9 @@ float away_from(const State& s, const Sleep::Strand& strand, uint32_t column) {
 
 void wake_one(const Model& m, State& s, uint32_t strand) {
   Sleep& z = s.sleep;
-  if (is_carried(s, strand)) leave(m, s, strand);
+  if (is_carried(s, strand)) wake_carried(m, s, strand);
   if (z.strand[strand].asleep) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
-  z.strand[strand].asleep = false, z.strand[strand].quiet = 0, z.strand[strand].round = 0;
+  z.strand[strand].asleep = false, z.strand[strand].quiet = 0, z.strand[strand].loop = 0;
   forget(z.load, strand), forget(z.watched, strand), forget(z.held, strand), forget(z.touched, strand);
 }
 
@@ -275,9 +271,9 @@ void reserve(const State& s, Sleep& z) {
 void wake(const Model& m, State& s) {
   Sleep& z = s.sleep;
   for (uint32_t k = 0; k < z.strand.size(); ++k)
-    if (is_carried(s, k)) leave(m, s, k);
+    if (is_carried(s, k)) wake_carried(m, s, k);
   if (z.any()) s.thread.travel = std::max(s.thread.travel, 1.0f);  // its pairs are listed again
-  for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0, k.round = 0;
+  for (Sleep::Strand& k : z.strand) k.asleep = false, k.quiet = 0, k.loop = 0;
   z.load.clear(), z.watched.clear(), z.held.clear(), z.touched.clear();
 }
 
@@ -306,7 +302,7 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
   for (const Sleep::Watched& w : z.watched) {
     const Carry& by = awake.carry[w.strand];
     const bool loads = by.moves() && w.may_move < m.sleep.nearby;
-    const float slack = z.strand[w.strand].round > 0 ? m.sleep.slack_strain : 0;
+    const float slack = z.strand[w.strand].loop > 0 ? m.sleep.slack_strain : 0;
     const float most = std::max(loads ? m.sleep.strain : w.may_move, slack), most2 = most * most;
     if (w.column >= wall::columns(s.wall) || length2(mid(s.wall, w.column) - by.place(w.mid)) > most2 ||
         length2(director(s.wall, w.column) - rotate(by.turn, w.director)) > most2)
@@ -329,12 +325,11 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
       if (!z.strand[a].asleep || !z.strand[b].asleep || (!by_a.moves() && !by_b.moves())) continue;
       if (apart(awake.box[a], awake.box[b], m.thread.material.diameter + kToolMargin)) continue;
       const Vec3 at = 0.5f * (awake.box[a].low + awake.box[a].high);
-      const float most = z.strand[a].round > 0 && z.strand[b].round > 0 ? m.sleep.slack_strain : m.sleep.nearby;
+      const float most = z.strand[a].loop > 0 && z.strand[b].loop > 0 ? m.sleep.slack_strain : m.sleep.nearby;
       if (length2(by_a.before(at) - by_b.before(at)) > most * most) awake.disturbed[a] = awake.disturbed[b] = 1;
     }
   for (uint32_t k = 0; k < n; ++k)  // a loop without slack would be taut now
-    if (const float round = z.strand[k].asleep ? z.strand[k].round : 0;
-        round > 0 && way_round(m, s, k) > round + m.sleep.longer)
+    if (const float loop = z.strand[k].asleep ? z.strand[k].loop : 0; loop > 0 && loop_length(m, s, k) > loop + m.sleep.longer)
       awake.disturbed[k] = 1;
   for (uint32_t k = 0; k < n; ++k)
     if (z.strand[k].asleep && !sleeps_on(m, s, k, holds, tools, wall_moved, awake)) wake_one(m, s, k);
@@ -479,7 +474,7 @@ void fall_asleep(const Model& m, State& s, AwakeThread& awake, std::span<const t
     if (!awake.ready[strand] || noted == 0 || full(z.watched, columns) || full(z.held, holds.size()) ||
         full(z.touched, tools.size()))
       continue;
-    me.asleep = true, me.round = is_slack(m, t, me) && has_knot(t, me) ? way_round(m, s, strand) : 0;
+    me.asleep = true, me.loop = is_slack(m, t, me) && has_knot(t, me) ? loop_length(m, s, strand) : 0;
     if (strand < awake.far_due.size()) awake.far_due[strand] = -1;
     const auto has = [&](uint32_t node) { return node >= me.first && node <= me.last; };
     forget(z.watched, strand);

@@ -33,14 +33,14 @@ struct SleepModel {
   float nearby = 50e-6f;  // [m] the same for a column near the strand that it does not load
   float strain = 20e-6f;  // [m] of a strand that is carried: a loaded column leaves the rigid motion by more
   // A tied loop with slack, as most finished stitches are: no tension is above that. Its thread swings to and fro in its holes
-  // for ever while the wall is worked on, and changes nothing. Its knot must not change; the way through its holes must not
+  // for ever while the wall is worked on, and changes nothing. Its knot must not change; the loop through its holes must not
   // become longer.
   float slack = 0.15f;           // [N]
   float slack_steady = 30e-3f;   // [N] no tension has changed by more
   float slack_swing = 0.15e-3f;  // [m] of thread between its holes, in a window
   float slack_strain = 0.1e-3f;  // [m] as `strain` and `nearby`
   float slack_knot = 10e-6f;     // [m] of the nodes of its knot against each other, in a window
-  float longer = 20e-6f;         // [m] of the way through its holes and back, since it fell asleep
+  float longer = 20e-6f;         // [m] of its loop, since it fell asleep
 };
 
 struct Sleep {
@@ -48,7 +48,7 @@ struct Sleep {
     uint32_t first = 0, last = 0;  // nodes
     uint32_t quiet = 0;            // steps since its window began
     bool asleep = false;
-    float round = 0;  // [m] the way through its holes and back, when it fell asleep; 0: it had no slack, or no knot
+    float loop = 0;  // [m] length of its loop, from hole to hole and back, when it fell asleep; 0: it had no slack, or no knot
   };
   std::vector<Strand> strand;  // all of the thread, in order
   uint32_t holes = 0;          // of the thread, when the strands were listed

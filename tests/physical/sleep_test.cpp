@@ -13,6 +13,7 @@
 
 #include "physical/carry.h"
 #include "physical/physical.h"
+#include "physical/quiet.h"
 #include "validation/suture_scenes.h"
 
 namespace catgut::physical {
@@ -167,6 +168,29 @@ TEST(Sleep, a_sleeping_knot_holds_as_one_that_is_awake) {
   EXPECT_GT(most, 0.5f);
   EXPECT_NEAR(*std::max_element(a.begin(), a.end()), most, 0.02f * most);
   EXPECT_NEAR(a.back(), b.back(), 0.02f * most);
+}
+
+// Its nodes turn and move as one: no change. Thread on one side of the knot, drawn 30 um along itself while the rest stays, as
+// if it slipped: a change well above what trembling nodes make (2 um).
+TEST(Sleep, a_knot_that_slips_is_told_from_one_that_is_moved) {
+  const thread::Settings settings = validation::knot_settings(0.3f);
+  validation::Tightened tight(validation::lay_knot(validation::square(), settings.material.diameter, 0.5e-3f));
+  validation::tighten(settings, tight, 2);
+  const thread::State tied = tight.knot.state;
+  const Sleep::Strand all{0, static_cast<uint32_t>(tied.nodes()) - 1};
+  ASSERT_TRUE(has_knot(tied, all));
+  std::vector<Vec3> from(tied.nodes());
+  for (size_t i = 0; i < from.size(); ++i) from[i] = tied.position(i);
+  thread::State moved = tied;
+  const Quat turn = axis_angle(normalized(Vec3{1, -2, 0.5f}), 0.3f);
+  for (size_t i = 0; i < from.size(); ++i)
+    moved.x.set(i, rotate(turn, from[i]) + Vec3{0.004f, 0, 0.001f}), moved.fine.set(i, {});
+  EXPECT_LT(knot_change(moved, all, from), 1e-6f);
+  thread::State slipped = tied;
+  for (size_t i = 0; i < tied.nodes() / 2; ++i) slipped.x.set(i, from[i] + normalized(from[i + 1] - from[i]) * 30e-6f);
+  const float change = knot_change(slipped, all, from);
+  std::printf("30 um through the knot: %.1f um\n", 1e6 * static_cast<double>(change));
+  EXPECT_GT(change, 10e-6f) << "SleepModel::slack_knot";
 }
 
 // A stitch whose ends are held taut: its force on the wall lasts while it sleeps.
@@ -500,9 +524,8 @@ TEST(Sleep, a_tied_stitch_with_slack_sleeps_while_its_wall_is_worked_on) {
   }
   for (size_t i = 0; i < kLooks; ++i) most = std::max(most, std::abs(width[1][i] - width[0][i]));
   std::printf(
-      "slept at %d of %d looks; its holes parted by up to %.0f um, within %.0f um of awake; 0.5 N: wider by %.3f mm (awake "
-      "%.3f), "
-      "%.3f N (awake %.3f)\n",
+      "slept at %d of %d looks; its holes parted by up to %.0f um, within %.0f um of awake; "
+      "0.5 N: wider by %.3f mm (awake %.3f), %.3f N (awake %.3f)\n",
       slept, kLooks, 1e6 * static_cast<double>(strained), 1e6 * static_cast<double>(most), 1e3 * static_cast<double>(wider[1]),
       1e3 * static_cast<double>(wider[0]), static_cast<double>(tension[1]), static_cast<double>(tension[0]));
   EXPECT_GT(slept, kLooks / 2) << "none, if only the rule for taut strands is left";

@@ -40,8 +40,18 @@ TEST(Measures, a_physical_scene_shows_its_thread_wall_and_forces) {
                                                                 [](float a, float b) { return std::abs(a) < std::abs(b); })));
   EXPECT_EQ(peak(m, "bite"), 0);
   EXPECT_EQ(peak(m, "seam"), -1) << "of guided mechanics";
-  state->physical.world.thread.overflow = 2;
+  // Loads of a known size, as the physics keeps them: a force, impulses over a step of the wall, and over the square of the
+  // thread's.
+  physical::State& world = state->physical.world;
+  const physical::Model& physics = model->physical->world;
+  world.hole.emplace_back().load = {0, 0.3f, -0.4f};
+  world.lip.emplace_back().impulse = Vec3{0, 0, 2} * physics.wall.step;
+  world.contact.emplace_back().normal_impulse = 0.7f * physics.thread.substep * physics.thread.substep;
+  world.thread.overflow = 2;
   measure(*model, *state, m);
+  EXPECT_FLOAT_EQ(peak(m, "bite"), 0.5f);
+  EXPECT_FLOAT_EQ(peak(m, "wall on wall"), 2);
+  EXPECT_FLOAT_EQ(peak(m, "thread on wall"), 0.7f);
   EXPECT_EQ(m.without_room, 2u);
 }
 
