@@ -39,8 +39,8 @@ std::pair<size_t, size_t> outer_holes(const thread::State& t, const Sleep::Stran
 // Calls visit(segment, segment) where the strand presses on itself beyond its outer holes.
 template <typename Visit>
 void each_crossing_of_knot(const thread::State& t, const Sleep::Strand& strand, Visit visit) {
-  const auto [first_hole, last_hole] = outer_holes(t, strand);
-  const auto beyond = [&](size_t k) { return has(strand, k) && (k <= first_hole || k >= last_hole); };
+  const std::pair<size_t, size_t> holes = outer_holes(t, strand);
+  const auto beyond = [&](size_t k) { return has(strand, k) && (k <= holes.first || k >= holes.second); };
   for (size_t i = 0; i < t.key.size(); ++i) {
     const size_t a = thread::segment_of(t.key[i]), b = thread::partner_of(t.key[i]);
     if (t.crossing[i].normal_impulse > 0 && b < thread::kTool && beyond(a) && beyond(b)) visit(a, b);
