@@ -179,7 +179,7 @@ void install(const Model& m, Layout&& l, Topology& t, Motion* motion) {
   }
   for (const Fragment& part : l.fragment) {
     const uint32_t from = m.lane_of_face[part.face], block = part.lane / kLanesOfBlock - static_cast<uint32_t>(wholes);
-    const float share = static_cast<float>(__builtin_popcountll(part.cells)) / static_cast<float>(kCells);
+    const float share = part_of_stiffness(part);
     for (uint32_t k = 0; k < kConstants; ++k)
       t.extra[block].constant[k][part.lane % kLanesOfBlock] = m.block[from / kLanesOfBlock].constant[k][from % kLanesOfBlock];
     for (const Constant k : kScaled) t.extra[block].constant[k][part.lane % kLanesOfBlock] *= share;

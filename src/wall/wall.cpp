@@ -66,16 +66,15 @@ void check(const Spec& spec) {
   if (std::count(used.begin(), used.end(), 0) > 0) fail("a column that belongs to no face", "leave it out");
 }
 
-// Calls visit(lane, inertia, part of the face) for every element.
+// Calls visit(lane, inertia, part of the face's mass, part of its stiffness) for every element.
 template <typename Visit>
 void each_element(const Model& m, const Topology& t, Visit&& visit) {
   for (uint32_t lane = 0; lane < m.face_of_lane.size(); ++lane) {
     const uint32_t face = m.face_of_lane[lane];
-    if (face != kNone && (t.first_fragment.empty() || t.first_fragment[face] == kNone)) visit(lane, m.inertia[lane], 1.0f);
+    if (face != kNone && (t.first_fragment.empty() || t.first_fragment[face] == kNone))
+      visit(lane, m.inertia[lane], 1.0f, 1.0f);
   }
-  for (const Fragment& f : t.fragment)
-    visit(f.lane, m.inertia[m.lane_of_face[f.face]],
-          static_cast<float>(__builtin_popcountll(f.cells)) / static_cast<float>(kCells));
+  for (const Fragment& f : t.fragment) visit(f.lane, m.inertia[m.lane_of_face[f.face]], part_of_mass(f), part_of_stiffness(f));
 }
 
 // block_forces over the blocks of the model and then those of the fragments.
@@ -112,7 +111,7 @@ void factor_again(const Model& m, Topology& t) {
   std::vector<Entry> entry;
   for (uint32_t c = 0; c < n; ++c)
     if (row[c] != kNone) entry.push_back({row[c], row[c], t.mass[c] * (1 + bed_inertia(m, t, c))});
-  each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& inertia, float part) {
+  each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& inertia, float, float part) {
     for (int e = 0; e < 6; ++e) {
       const double w = scale * static_cast<double>(inertia.edge[e] * part);
       if (w == 0) continue;
@@ -203,17 +202,17 @@ void renew_topology(const Model& m, Topology& t, bool again) {
   std::vector<float> dir(n, 0), diagonal(n, 0);
   std::vector<std::vector<uint32_t>> from(n);
   const float scale = m.step * m.step * m.report.scale;
-  each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& w, float part) {
+  each_element(m, t, [&](uint32_t lane, const Model::LaneInertia& w, float part, float stiff) {
     const uint32_t block = lane / kLanesOfBlock, in = lane % kLanesOfBlock;
     const auto& corner = t.corners[block].column;
     for (uint32_t k = 0; k < (t.corners[block].quads ? 4u : 3u); ++k) {
       const uint32_t c = corner[k][in];
-      t.mass[c] += w.mass * part, dir[c] += w.dir * part;
+      t.mass[c] += w.mass * part, dir[c] += w.dir * stiff;
       from[c].push_back((block * 4 + k) * kLanesOfBlock + in);
     }
     for (int e = 0; e < 6; ++e)
       for (int side = 0; side < 2; ++side)
-        if (w.edge[e] > 0) diagonal[corner[kEdge[e][side]][in]] += w.edge[e] * part;
+        if (w.edge[e] > 0) diagonal[corner[kEdge[e][side]][in]] += w.edge[e] * stiff;
   });
   t.inv_dir.assign(n, 0);
   t.gather_first.assign(1, 0), t.gather_from.clear();
