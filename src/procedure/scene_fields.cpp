@@ -143,7 +143,7 @@ const Field kField[] = {
     {"technique", "throws", "", 1, 8, nullptr, "minimum throws of a secure knot", TOP(technique.throws)},
 
     {"surgeon", "plan", "", 0, 0, &plan_choices, "plan of the scripted surgeon; empty: that of the technique. running: rows of bites in one bowel. interrupted: one stitch over a gap, without a technique. simple: the same, tied and cut. over_and_over: a running suture over a gap. lembert_thread: a stitch that turns the edges inward. connell_thread: a loop along both edges. skin_tied: a stitch over a slit in skin, tied. purse_string_thread: a purse-string that its thread alone draws. purse_string_tied: the same, tied with an assistant's forceps on the first throw. excision: the end of a bowel is cut off with an electrosurgical pen. slit: its opening is lengthened with scissors", TOP(surgeon.plan)},
-    {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites", TOP(surgeon.bites)},
+    {"surgeon", "bites", "", 0, 1000, nullptr, "number of bites; of stitches in altemeier", TOP(surgeon.bites)},
     {"surgeon", "edge_distance", "m", 0, 0.1, nullptr, "distance of the bites from the rim", TOP(surgeon.edge_distance)},
     {"surgeon", "bite_length", "m", 0, 0.1, nullptr, "bite length along the rim", TOP(surgeon.bite_length)},
     {"surgeon", "tail", "m", 0, 10, nullptr, "length of the tail", TOP(surgeon.tail)},

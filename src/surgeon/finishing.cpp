@@ -27,7 +27,6 @@ constexpr float kWhole = 1;            // [m]: longer than a thread
 constexpr float kStumpClear = 2e-3f;
 constexpr size_t kRunsOn = 8;            // nodes
 constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};  // unit, from the blades along the shaft
-constexpr int kPiece = 10;               // first stage of carrying a cut-off tail away
 constexpr int kPieceMisses = 3;          // then it is left where it fell
 constexpr float kPieceLoad = 1;  // [N] by which a stitch's thread becomes tauter while a loose piece is lifted: it is held too
 constexpr float kPieceGrip = 0.008f;          // [m] of the jaws from where it was cut
@@ -56,6 +55,9 @@ size_t knot_end(const Snapshot& seen, bool tail) {
   }
   return found;
 }
+
+// The piece from the free end to node `end` runs through tissue.
+bool is_sewn(const Snapshot& seen, size_t end) { return !seen.active().suture_point.empty() && first_point_node(seen) < end; }
 
 // [m] from a node to the nearest thread of its suture, but for what runs on from it.
 float own_room(const Snapshot& seen, size_t node) {
@@ -129,7 +131,7 @@ size_t Scripted::node_to_cut(const Snapshot& seen, bool tail, bool begins) const
     const size_t i = std::clamp<size_t>(node_along(seen, from, out, tail ? -1 : 1), 1, last - 1);
     float clear = wanted;
     for (size_t k = first; k <= end; ++k) clear = std::min(clear, distance(node_at(seen, i), node_at(seen, k)));
-    if (physical) clear = std::min({clear, own_room(seen, i), room_at(picture_, seen, node_at(seen, i), false, wanted)});
+    if (physical) clear = std::min(clear, room_to_cut(seen, i, wanted));
     if (clear > clearest && (!physical || keeps_throws(i))) clearest = clear, at = i;
   }
   return at;
@@ -183,13 +185,19 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   }
 }
 
+float Scripted::room_to_cut(const Snapshot& seen, size_t node, float most) const {
+  return std::min(own_room(seen, node), room_at(picture_, seen, node_at(seen, node), false, most));
+}
+
 // A node of the cut-off tail that ends with node `end`: as near to the cut as no other thread would come between the jaws, too.
+// If the piece runs through tissue, as near to where it leaves that.
 size_t Scripted::piece_grip(const Snapshot& seen, size_t end) const {
+  if (is_sewn(seen, end)) end = first_point_node(seen);
   size_t at = end;
   float most = -1;
   for (float out = kPieceGrip + 0.004f * static_cast<float>(misses_); most < kStumpClear; out += 0.002f) {
     const size_t i = node_along(seen, end, out, -1);
-    const float room = std::min(own_room(seen, i), room_at(picture_, seen, node_at(seen, i), false, kStumpClear));
+    const float room = room_to_cut(seen, i, kStumpClear);
     if (room > most) most = room, at = i;
     if (i == 0) break;
   }
@@ -208,6 +216,8 @@ bool Scripted::take_piece(const Snapshot& seen) {
     piece_from_ = from[clear_shaft(picture_, seen, place, from)];
   }
   const size_t at = cut_at_;
+  // A piece that runs through tissue is drawn out of it.
+  const float gently = is_sewn(seen, end) ? std::clamp(1.5f - length(seen.tool[kNeedleHolder].force), 0.02f, 1.0f) : 1;
   const Vec3 x =
       normalized(cross(piece_from_, node_at(seen, std::min(at + 1, end)) - node_at(seen, at > 0 ? at - 1 : 0)), {1, 0, 0});
   const Pose goal{node_at(seen, at) + piece_from_ * kNearTips, from_axes(x, cross(piece_from_, x), piece_from_)};
@@ -232,7 +242,8 @@ bool Scripted::take_piece(const Snapshot& seen) {
       return false;
     case lift:
       if (largest_tension(seen, end + 1) > stitch_load_ + kPieceLoad) return missed(), false;
-      if (move(kNeedleHolder, {stitch(seen) + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, careful()) || !patience(6))
+      if (move(kNeedleHolder, {stitch(seen) + Vec3{0, kPieceUp, 0}, hand_[kNeedleHolder].pose.q}, careful() * gently) ||
+          !patience(6))
         go(carry);
       return false;
     case carry:

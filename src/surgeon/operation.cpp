@@ -18,6 +18,7 @@ constexpr float kLean = 0.3f;        // of a clamp's shaft, outward
 constexpr float kGrasped = 0.4f;     // [s] of closed jaws
 constexpr float kLeftOf = 0.03f;     // [m] of the opening's center: a needle farther to the left is carried to the right first
 constexpr int kMostMisses = 8;
+constexpr int kMostTakenOut = 4;               // stitches, of the whole operation
 constexpr float kPulls = 4;                    // [s] the colon's clamp, at the end
 constexpr Vec3 kAside{-0.20f, 0.10f, -0.20f};  // [m] from the focus: where the assistant keeps the specimen
 
@@ -25,6 +26,7 @@ constexpr Vec3 kAside{-0.20f, 0.10f, -0.20f};  // [m] from the focus: where the 
 
 Operating::Operating(const PictureModel& picture, const SurgeonSkill& skill)
     : picture_(picture), skill_(skill), opening_(opening_shape(picture, 0)), random_(skill.seed) {
+  stitches_ = std::clamp<size_t>(static_cast<size_t>(skill.bites), 1, picture.suture.size());
   u_ = normalized(Vec3{1, 0, 0} - opening_.axis * opening_.axis.x, any_perpendicular(opening_.axis));
   v_ = cross(opening_.axis, u_);
   for (size_t i = 0; i < picture.instrument.size(); ++i)
@@ -69,6 +71,8 @@ std::string Operating::doing() const {
     case carry:
       doing = "the assistant carries the specimen away";
       break;
+    case remove:
+      return "stitch " + std::to_string(stitched_ + 1) + ": " + sewing_->doing();
     case take_holder:
       doing = "take the needle holder";
       break;
@@ -81,7 +85,7 @@ std::string Operating::doing() const {
       doing = "the colon retracts";
       break;
     case finished:
-      return untied_ > 0 ? "gave up: stitches without a knot: " + std::to_string(untied_) : "done";
+      return "done";
   }
   return gave_up_ ? "gave up: " + doing : doing;
 }
@@ -145,28 +149,53 @@ void Operating::join(const TickInput& part, std::initializer_list<size_t> hands)
   for (const size_t k : hands) led_[k] = 1, hand_[k].pose = part.hand[k].pose, hand_[k].jaw = part.hand[k].jaw;
 }
 
+// The suture in the forceps if it has been pulled through, else the first that is whole and in no tissue.
+void Operating::choose_suture(const Snapshot& seen) {
+  suture_ = seen.tool[kLeft].held_suture;
+  if (pulled_through(seen)) return;
+  const auto whole = [](const SutureView& s) {
+    return s.needle_on_thread && s.suture_point.empty() && std::count(s.thread_cut.begin(), s.thread_cut.end(), 1) == 0;
+  };
+  suture_ = static_cast<size_t>(std::find_if(seen.suture.begin(), seen.suture.end(), whole) - seen.suture.begin());
+}
+
 // The places of all stitches are at one angle of a field that is turned: the tissue at rest turns too.
 void Operating::begin_stitch(const Snapshot& seen, TaskKind from) {
-  const size_t sutures = picture_.suture.size();
-  turn_ = -2 * kPi * static_cast<float>(place_of_stitch(stitched_)) / static_cast<float>(sutures);
+  turn_ = -2 * kPi * static_cast<float>(place_of_stitch(stitched_)) / static_cast<float>(stitches_);
   PictureModel picture = picture_;
   const Quat q = axis_angle(opening_.axis, turn_);
   for (Vec3& p : picture.particle_rest) p = opening_.center + rotate(q, p - opening_.center);
   const std::vector<Task> task = make_plan("altemeier", picture, skill_).task;
-  const size_t tasks = task.size() / sutures;
+  const size_t tasks = task.size() / picture_.suture.size();
   // The thread follows its needle. From the left it would lie under the forceps.
-  const Vec3 needle = rotate(q, seen.suture[stitched_].needle.pose.p - opening_.center);
+  const Vec3 needle = rotate(q, seen.suture[suture_].needle.pose.p - opening_.center);
   carries_ = from == TaskKind::pick_up && dot(needle, u_) < -kLeftOf;
   std::vector<size_t> mine;
-  for (size_t t = stitched_ * tasks; t < (stitched_ + 1) * tasks && !(carries_ && mine.size() == 1); ++t)
+  for (size_t t = suture_ * tasks; t < (suture_ + 1) * tasks && !(carries_ && mine.size() == 1); ++t)
     if (!mine.empty() || task[t].kind == from) mine.push_back(t);
   sewing_.emplace("altemeier", picture, skill_);
   sewing_->take_over_for(mine);
 }
 
+void Operating::next_stitch(const Snapshot& seen) {
+  choose_suture(seen);
+  if (suture_ == seen.suture.size()) return void(gave_up_ = true);  // none is left
+  begin_stitch(seen, TaskKind::pick_up);
+  go(sew);
+}
+
+// True when what `sewing_` has to do is done.
+bool Operating::sew_on(const Snapshot& seen) {
+  TickInput part = sewing_->operate(turn_ == 0 ? seen : turned(seen, turn_), dt_);
+  if (turn_ != 0) turn_back(part, turn_);
+  join(part, {kRight, kLeft});
+  if (sewing_->done()) retries_of_parts_ += sewing_->retries();
+  return sewing_->done();
+}
+
 // Each stitch as far from those before it as it can be: opposite first, then halving the gaps.
 size_t Operating::place_of_stitch(size_t stitch) const {
-  const size_t n = picture_.suture.size();
+  const size_t n = stitches_;
   std::vector<size_t> taken{0};
   while (taken.size() <= stitch) {
     size_t best = 0, far = 0;
@@ -183,8 +212,8 @@ size_t Operating::place_of_stitch(size_t stitch) const {
 // The needle has made both bites of this stitch, and the forceps holds it.
 bool Operating::pulled_through(const Snapshot& seen) const {
   const ToolView& forceps = seen.tool[kLeft];
-  const auto& bite = seen.suture[stitched_].bite;
-  return forceps.held == Held::needle && forceps.held_suture == stitched_ &&
+  const auto& bite = seen.suture[suture_].bite;
+  return forceps.held == Held::needle && forceps.held_suture == suture_ &&
          std::count_if(bite.begin(), bite.end(), [](const BiteView& b) { return b.complete; }) >= 2;
 }
 
@@ -193,7 +222,7 @@ void Operating::look(const Snapshot& seen) {
   const auto holds = [&](uint16_t i) { return seen.instrument[i].held == Held::tissue; };
   clamped_ = static_cast<size_t>(std::count_if(clamp_.begin(), clamp_.end(), holds));
   stitched_ = static_cast<size_t>(std::count_if(seen.suture.begin(), seen.suture.end(), is_cut_off));
-  if (stitched_ == seen.suture.size()) go(pull);
+  if (stitched_ >= stitches_) go(pull);
   else if (seen.topology.pieces > picture_.body.size()) go(take_holder);
   else if (clamped_ == clamp_.size()) go(seen.tool[kAssistant].instrument < 0 ? off_rim : take_pen);
 }
@@ -268,29 +297,26 @@ void Operating::act(const Snapshot& seen) {
       return;
     case take_holder:
       swap_for(seen, kHoldNeedle, sew);
-      if (stage_ == sew) begin_stitch(seen, pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
+      if (stage_ != sew) return;
+      choose_suture(seen);
+      begin_stitch(seen, pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
       return;
-    case sew: {
-      TickInput part = sewing_->operate(turn_ == 0 ? seen : turned(seen, turn_), dt_);
-      if (turn_ != 0) turn_back(part, turn_);
-      join(part, {kRight, kLeft});
-      if (!sewing_->done()) return;
-      retries_of_parts_ += sewing_->retries();
-      if (sewing_->gave_up() && (leaves_untied_ || !pulled_through(seen))) {
-        gave_up_ = true;
-      } else if (carries_) {
-        way_ = 0, go(carry_needle);
-      } else if (sewing_->gave_up()) {  // the knot failed: the needle is laid down, and the next stitch begins
-        ++untied_, leaves_untied_ = true;
-        begin_stitch(seen, TaskKind::leave);
-      } else if (leaves_untied_ = false; ++stitched_ < picture_.suture.size()) {
-        begin_stitch(seen, TaskKind::pick_up);
-      } else {
-        sewing_.reset();
-        go(pull);
+    case sew:
+      if (!sew_on(seen)) return;
+      if (sewing_->gave_up()) {  // a stitch that cannot be tied is taken out, and made again
+        if (!pulled_through(seen) || ++taken_out_ > kMostTakenOut) return void(gave_up_ = true);
+        ++retries_;
+        sewing_->take_over_to_remove();
+        return go(remove);
       }
-      return;
-    }
+      if (carries_) return way_ = 0, go(carry_needle);
+      if (++stitched_ < stitches_) return next_stitch(seen);
+      sewing_.reset();
+      return go(pull);
+    case remove:
+      if (!sew_on(seen)) return;
+      if (sewing_->gave_up()) return void(gave_up_ = true);
+      return next_stitch(seen);
     case carry_needle: {  // round in front of the field, and from the right to the bite
       constexpr std::array<Vec3, 3> kWay{Vec3{-0.07f, 0.05f, 0.09f}, {0.03f, 0.06f, 0.12f}, {0.14f, 0.06f, 0.07f}};
       const Vec3 to = u_ * kWay[way_].x + opening_.axis * kWay[way_].y - v_ * kWay[way_].z;
@@ -302,7 +328,7 @@ void Operating::act(const Snapshot& seen) {
     }
     case pull:
       commands_.push({CommandKind::pull_clamp, kAssistant, static_cast<uint16_t>(picture_.body.size() - 1)});
-      if (waited_ > kPulls) gave_up_ = untied_ > 0, go(finished);
+      if (waited_ > kPulls) go(finished);
       return;
     case finished:
       return;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // surgeon/operation: the scripted surgeon carries out the scene "altemeier". He closes Allis clamps on the rim of the prolapse
 // and parks them; an assistant takes one of them. Then he cuts the outer tube all round (surgeon/excision) and the assistant
-// carries the specimen away. With each suture of the scene he joins the cut edge to the inner tube (surgeon/scripted). When all
-// hands are away, the inner tube retracts by its clamp, as a colon does: only the stitches hold it. Reads
-// Snapshots only.
+// carries the specimen away. With SurgeonSkill::bites stitches, each of its own suture, he joins the cut edge to the inner tube
+// (surgeon/scripted). A stitch that he cannot tie is taken out and made again, with another suture if its thread was cut. When
+// all hands are away, the inner tube retracts by its clamp, as a colon does: only the stitches hold it. Reads Snapshots only.
 #pragma once
 #include <array>
 #include <optional>
@@ -44,6 +44,7 @@ class Operating final : public Surgeon {
     take_holder,
     sew,
     carry_needle,
+    remove,
     pull,
     finished
   };
@@ -55,8 +56,11 @@ class Operating final : public Surgeon {
   Pose clamp_at(float angle, float raised) const;  // jaws about the rim
   void swap_for(const Snapshot& seen, uint32_t capability, Stage next);
   bool pulled_through(const Snapshot& seen) const;
+  void choose_suture(const Snapshot& seen);  // suture_; the number of sutures if none is left
   void begin_stitch(const Snapshot& seen, TaskKind from);
-  size_t place_of_stitch(size_t stitch) const;  // of as many places round the opening as there are sutures
+  void next_stitch(const Snapshot& seen);
+  bool sew_on(const Snapshot& seen);
+  size_t place_of_stitch(size_t stitch) const;  // of as many places round the opening as there are stitches
   // The field as a surgeon sees it who stands where the next stitch is on his left; and his hands, back in the scene.
   Snapshot turned(const Snapshot& seen, float by) const;
   void turn_back(TickInput& input, float by) const;
@@ -72,12 +76,13 @@ class Operating final : public Surgeon {
   Random random_;
   Stage stage_ = take_clamp;
   float waited_ = 0, dt_ = 1.0f / 60;
-  float turn_ = 0;  // [rad] of the field, for this stitch
-  size_t clamped_ = 0, stitched_ = 0, untied_ = 0;
+  float turn_ = 0;       // [rad] of the field, for this stitch
+  size_t stitches_ = 0;  // that he makes
+  size_t clamped_ = 0, stitched_ = 0;
+  size_t suture_ = 0;  // of the stitch in hand
   size_t way_ = 0;
-  bool leaves_untied_ = false;  // the stitch in hand
-  bool carries_ = false;        // its needle lies on the left, and is carried to the right first
-  int misses_ = 0, retries_ = 0, retries_of_parts_ = 0;
+  bool carries_ = false;  // its needle lies on the left, and is carried to the right first
+  int misses_ = 0, taken_out_ = 0, retries_ = 0, retries_of_parts_ = 0;
   bool gave_up_ = false;
   uint32_t sequence_ = 0;
   std::optional<Excising> excising_;

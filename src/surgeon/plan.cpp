@@ -572,7 +572,7 @@ std::span<const char* const> task_names() {
   static constexpr const char* kName[] = {"pick_up",       "hold_edge",   "bite",       "draw_out",  "pull_tail", "pull_slack",
                                           "pull_together", "hand_back",   "regrip",     "draw",      "throw",     "lock_strand",
                                           "cut_long",      "cut_tail",    "cut_needle", "take_both", "discard",   "fresh",
-                                          "gather",        "approximate", "leave",      "rest"};
+                                          "gather",        "approximate", "remove",     "leave",     "rest"};
   static_assert(std::size(kName) == static_cast<size_t>(TaskKind::rest) + 1);
   return kName;
 }

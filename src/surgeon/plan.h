@@ -54,6 +54,7 @@ enum class TaskKind {
   fresh,          // a new suture
   gather,         // the needle holder takes the tail; both hands pull with Plan::pull and hold both ends
   approximate,    // the assistant brings the clamped bowel ends together, so that a knot is tied without tension
+  remove,         // a stitch that cannot be tied is taken out: cut, its needle laid aside, its thread drawn out
   leave,          // the forceps lays the needle down; no hand holds anything, and the tissue settles
   rest            // hands off; the tissue settles
 };

@@ -280,6 +280,9 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
       doing_ = "bring the bowel ends together";
       order_clamps(true);
       return waited_ > plan_.approximate / kClampSpeed;
+    case TaskKind::remove:
+      doing_ = "take the stitch out";
+      return remove(seen);
     case TaskKind::leave:
       doing_ = "hands away";
       return leave(seen);

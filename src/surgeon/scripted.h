@@ -3,7 +3,8 @@
 // about its own circle. The forceps (left) grasps the tip, brings it through and pulls the thread; knots are instrument ties.
 // Reads Snapshots only; each step checks the actual state before the next begins. Failed steps are repeated. A bite whose tip
 // did not exit is withdrawn and driven slightly shallower or deeper, a missed grasp is approached again, a throw whose loop
-// did not hold is wound again. Bites are in biting.cpp, knots in tying.cpp, scissors in finishing.cpp.
+// did not hold is wound again. Bites are in biting.cpp, knots in tying.cpp, scissors in finishing.cpp, stitches that are taken
+// out in removal.cpp.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -24,6 +25,7 @@ constexpr int kAttempts = 8;  // per bite, per grasp, per throw
 constexpr float kJustOpen =
     0.6f;  // of jaws beside the other instrument: they release at half, and wide open they would meet it
 constexpr float kHalfOpen = 0.7f;       // of jaws that release without shaking off a loop
+constexpr int kPiece = 10;              // first stage of carrying a cut-off tail away
 constexpr float kStrandsTouch = 1e-3f;  // [m] between the nodes of two strands in contact
 
 class Scripted final : public Surgeon {
@@ -32,6 +34,8 @@ class Scripted final : public Surgeon {
 
   // Only these tasks of the plan, with the tools in their present state.
   void take_over_for(const std::vector<size_t>& tasks);
+  // Takes the stitch in hand out of the tissue instead, also when he has given up; retries() counts from 0 again.
+  void take_over_to_remove();
 
   bool done() const override { return gave_up_ || task_ >= plan_.task.size(); }
   bool gave_up() const override { return gave_up_; }
@@ -194,8 +198,15 @@ class Scripted final : public Surgeon {
   bool cut(TaskKind kind, const Snapshot& seen);
   // The needle holder carries the tail's piece away: left in the field it would lie between jaws and tissue at the next stitch.
   size_t piece_grip(const Snapshot& seen, size_t end) const;
+  // [m] of a node from any other thread, its own suture's too.
+  float room_to_cut(const Snapshot& seen, size_t node, float most) const;
   bool take_piece(const Snapshot& seen);
   static size_t count_cuts(const Snapshot& seen);
+
+  // --- a stitch that failed is taken out --------------------------------------------------------------------------------
+  bool remove(const Snapshot& seen);
+  size_t node_to_remove(const Snapshot& seen) const;
+  Vec3 place_for_needle(const Snapshot& seen) const;
 
   bool discard(const Snapshot& seen);
   bool fresh(const Snapshot& seen);
@@ -243,6 +254,7 @@ class Scripted final : public Surgeon {
   uint32_t throws_before_ = 0, take_slot_ = 0;
   Quat take_turn_;
   Vec3 tried_, piece_from_;              // piece_from_: unit, from a piece of thread along the shaft of the jaws that take it
+  Vec3 laid_at_;                         // of a stitch that is taken out: where its needle is laid down
   std::optional<ThreadTie> thread_tie_;  // with physical mechanics, from the first throw on
   float clamped_ = 0;                    // [s] that both strands are still held taut, within a throw: the clamps move back
   int assisting_ = 0;  // stage of the assistant's hand at the crossing of a throw; 0: it waits beyond the field
