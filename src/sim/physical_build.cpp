@@ -24,8 +24,8 @@ constexpr float kThreadDrag = 30;  // [1/s] on thread. At 0.1 m/s it is 0.15 N p
 // [N] with which tissue holds slack thread in a hole (an estimate). Without it the thread creeps into the lumen by its weight:
 // Coulomb friction needs tension.
 constexpr float kHoleGrip = 0.03f;
-// [N] of physical::SleepModel::slack. Off: the one run of altemeier with it lost four stitches (docs/physical.md, "Cost").
-constexpr float kSlack = 0;
+// [N] of physical::SleepModel::slack: finished stitches of `altemeier` bear less than 0.1 (docs/physical.md, "Cost").
+constexpr float kSlack = 0.15f;
 constexpr float kLyingForce = 0.05f;  // [N] with which the drape holds a needle that lies on it
 
 std::string name_of(const SceneSpec& scene) { return scene.name.empty() ? "scene" : scene.name; }
