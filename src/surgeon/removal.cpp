@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// surgeon/removal: a stitch that could not be tied is taken out. Without a throw, the thread is drawn out by its needle. Else its
-// strand is cut where it leaves the tissue, the needle is laid aside, and the thread is drawn out by its tail. Left lying, it
-// would hinder the next stitches. See scripted.h.
+// surgeon/removal: a stitch that could not be tied is taken out. Without a throw, the thread is drawn out by its needle. Else
+// its strand is cut where it leaves the tissue, the needle is laid aside, and the thread is drawn out by its tail. Left lying,
+// it would hinder the next stitches. See scripted.h.
 #include <algorithm>
 #include <array>
 #include <vector>
@@ -54,7 +54,8 @@ size_t Scripted::node_to_remove(const Snapshot& seen) const {
 
 // On the drape, to the left of the field and in front of it or behind, where no other thread lies.
 Vec3 Scripted::place_for_needle(const Snapshot& seen) const {
-  constexpr std::array<Vec3, 5> kWay{Vec3{-0.8f, 0, 0.6f}, {-1, 0, 0}, {-0.5f, 0, 0.85f}, {-0.8f, 0, -0.6f}, {-0.5f, 0, -0.85f}};
+  constexpr std::array<Vec3, 5> kWay{
+      Vec3{-0.8f, 0, 0.6f}, {-1, 0, 0}, {-0.5f, 0, 0.85f}, {-0.8f, 0, -0.6f}, {-0.5f, 0, -0.85f}};
   Vec3 best = kWay[0];
   float most = -1;
   for (const Vec3 way : kWay) {
@@ -108,7 +109,8 @@ bool Scripted::remove(const Snapshot& seen) {
       rest_aside(seen, kNeedleHolder);
       if (waited_ <= dt_) laid_at_ = place_for_needle(seen);
       const Vec3 goal = laid_at_ + Vec3{0, kOverField, 0};
-      if (!holds_needle(seen, kForceps) || carry_swage(seen, goal, 0.5f * gently * speed) || !patience(kDrawPatience)) go(lower);
+      if (!holds_needle(seen, kForceps) || carry_swage(seen, goal, 0.5f * gently * speed) || !patience(kDrawPatience))
+        go(lower);
       return false;
     }
     case lower:

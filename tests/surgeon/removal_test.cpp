@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// tests/surgeon: a stitch that is taken out, before its first throw and after it. No thread is left in the walls or beside them,
-// and neither walls nor thread are torn.
+// tests/surgeon: a stitch that is taken out, before its first throw and after it. No thread is left in the walls or beside
+// them, and neither walls nor thread are torn.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -51,7 +51,8 @@ void take_out(int throws) {
 
   Scripted second(plan_of(scene), picture_model(*model), skill_of(scene));
   second.take_over_to_remove();
-  work(second, [] { return false; }, 60);
+  work(
+      second, [] { return false; }, 60);
   std::printf("%s, %d retries\n", second.doing().c_str(), second.retries());
   EXPECT_EQ(second.doing(), "done");
   EXPECT_TRUE(seen.active().suture_point.empty());
