@@ -180,7 +180,7 @@ void Operating::begin_stitch(const Snapshot& seen, TaskKind from) {
 void Operating::next_stitch(const Snapshot& seen) {
   choose_suture(seen);
   if (suture_ == seen.suture.size()) return void(gave_up_ = true);  // none is left
-  begin_stitch(seen, TaskKind::pick_up);
+  begin_stitch(seen, pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
   go(sew);
 }
 
@@ -209,12 +209,15 @@ size_t Operating::place_of_stitch(size_t stitch) const {
   return taken[stitch];
 }
 
-// The needle has made both bites of this stitch, and the forceps holds it.
-bool Operating::pulled_through(const Snapshot& seen) const {
+// The forceps holds the needle of this stitch, outside the tissue.
+bool Operating::in_forceps(const Snapshot& seen) const {
   const ToolView& forceps = seen.tool[kLeft];
-  const auto& bite = seen.suture[suture_].bite;
-  return forceps.held == Held::needle && forceps.held_suture == suture_ &&
-         std::count_if(bite.begin(), bite.end(), [](const BiteView& b) { return b.complete; }) >= 2;
+  return forceps.held == Held::needle && forceps.held_suture == suture_ && !seen.suture[suture_].needle.in_tissue;
+}
+
+// And its thread runs through both walls.
+bool Operating::pulled_through(const Snapshot& seen) const {
+  return in_forceps(seen) && seen.suture[suture_].suture_point.size() >= 4;
 }
 
 void Operating::look(const Snapshot& seen) {
@@ -297,14 +300,12 @@ void Operating::act(const Snapshot& seen) {
       return;
     case take_holder:
       swap_for(seen, kHoldNeedle, sew);
-      if (stage_ != sew) return;
-      choose_suture(seen);
-      begin_stitch(seen, pulled_through(seen) ? TaskKind::throw_ : TaskKind::pick_up);
+      if (stage_ == sew) next_stitch(seen);
       return;
     case sew:
       if (!sew_on(seen)) return;
-      if (sewing_->gave_up()) {  // a stitch that cannot be tied is taken out, and made again
-        if (!pulled_through(seen) || ++taken_out_ > kMostTakenOut) return void(gave_up_ = true);
+      if (sewing_->gave_up()) {  // a stitch that fails is taken out, and made again
+        if (!in_forceps(seen) || ++taken_out_ > kMostTakenOut) return void(gave_up_ = true);
         ++retries_;
         sewing_->take_over_to_remove();
         return go(remove);

@@ -2,7 +2,7 @@
 // surgeon/operation: the scripted surgeon carries out the scene "altemeier". He closes Allis clamps on the rim of the prolapse
 // and parks them; an assistant takes one of them. Then he cuts the outer tube all round (surgeon/excision) and the assistant
 // carries the specimen away. With SurgeonSkill::bites stitches, each of its own suture, he joins the cut edge to the inner tube
-// (surgeon/scripted). A stitch that he cannot tie is taken out and made again, with another suture if its thread was cut. When
+// (surgeon/scripted). A stitch that fails is taken out and made again, with another suture if its thread was cut. When
 // all hands are away, the inner tube retracts by its clamp, as a colon does: only the stitches hold it. Reads Snapshots only.
 #pragma once
 #include <array>
@@ -55,6 +55,7 @@ class Operating final : public Surgeon {
   Vec3 radial(float angle) const { return u_ * portable::cos(angle) + v_ * portable::sin(angle); }
   Pose clamp_at(float angle, float raised) const;  // jaws about the rim
   void swap_for(const Snapshot& seen, uint32_t capability, Stage next);
+  bool in_forceps(const Snapshot& seen) const;
   bool pulled_through(const Snapshot& seen) const;
   void choose_suture(const Snapshot& seen);  // suture_; the number of sutures if none is left
   void begin_stitch(const Snapshot& seen, TaskKind from);
