@@ -67,7 +67,7 @@ Vec3 Scripted::place_for_needle(const Snapshot& seen) const {
 }
 
 bool Scripted::remove(const Snapshot& seen) {
-  enum { draw, over, down, snip, rise, carry, lower, open, away };
+  enum { pull_out, over, down, snip, rise, carry, lower, open, away };
   if (stage_ >= kPiece) {
     if (!take_piece(seen)) return false;
     gave_up_ |= !seen.active().suture_point.empty();
@@ -75,7 +75,7 @@ bool Scripted::remove(const Snapshot& seen) {
   }
   const float speed = skill_.speed, gently = std::clamp(1.5f - length(seen.tool[kForceps].force), 0.02f, 1.0f);
   switch (stage_) {
-    case draw:
+    case pull_out:
       rest_aside(seen, kNeedleHolder);
       if (seen.active().suture_point.empty()) go(carry);
       else if ((waited_ <= dt_ && has_throw(seen)) || !holds_needle(seen, kForceps) || !patience(kDrawPatience)) go(over);
