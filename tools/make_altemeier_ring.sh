@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# Makes docs/media/altemeier_ring.jpg, altemeier_sheet.jpg and altemeier_film.webp: the end of scene altemeier with seed 1, at
+# Makes docs/media/altemeier_ring.jpg, altemeier_sheet.jpg and altemeier_film.webp: the end of scene altemeier with seed 2, at
 # rest and while the colon is pulled; a contact sheet; and the whole run at forty times real time. One to three hours; a recording
 # that is in the folder already is used.
 #   tools/make_altemeier_ring.sh [FOLDER]     folder of recording, film and PNGs (default out/altemeier)
@@ -9,7 +9,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 folder="${1:-out/altemeier}" catgut="${CATGUT:-./catgut}"
 mkdir -p "$folder"
 [ -s "$folder/whole.cgrec" ] && [ -s "$folder/whole.json" ] ||
-  "$catgut" run altemeier --seed 1 --headless --record "$folder/whole.cgrec" --json "$folder/whole.json"
+  "$catgut" run altemeier --seed 2 --headless --record "$folder/whole.cgrec" --json "$folder/whole.json"
 # The colon retracts in the last four seconds.
 end="$(sed -nE 's/^ *"simulated_s": ([0-9]+)\..*/\1/p' "$folder/whole.json" | head -n 1)"
 "$catgut" replay "$folder/whole.cgrec" --check --size 640x360 --contact-sheet "$folder/sheet.png" \

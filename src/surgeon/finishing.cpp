@@ -156,11 +156,7 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
   const bool begins = stage_ == over && waited_ <= dt_;
   const size_t at = node_to_cut(seen, tail, begins);
   if (begins) cut_at_ = at;
-  Pose goal = tying_pose(kNeedleHolder, node_at(seen, at));
-  if (physical) {  // from above, the strand between the jaws
-    const Vec3 x = normalized(cross(kCutFrom, node_at(seen, at + 1) - node_at(seen, at - 1)), {1, 0, 0});
-    goal.q = from_axes(x, cross(kCutFrom, x), kCutFrom);
-  }
+  const Pose goal = physical ? blades_at(seen, at) : tying_pose(kNeedleHolder, node_at(seen, at));
   switch (stage_) {
     case over:
       cuts_before_ = count_cuts(seen);
@@ -183,6 +179,11 @@ bool Scripted::cut(TaskKind kind, const Snapshot& seen) {
       go(kPiece);
       return false;
   }
+}
+
+Pose Scripted::blades_at(const Snapshot& seen, size_t node) const {
+  const Vec3 x = normalized(cross(kCutFrom, node_at(seen, node + 1) - node_at(seen, node - 1)), {1, 0, 0});
+  return {node_at(seen, node), from_axes(x, cross(kCutFrom, x), kCutFrom)};
 }
 
 float Scripted::room_to_cut(const Snapshot& seen, size_t node, float most) const {

@@ -71,12 +71,11 @@ std::string Operating::doing() const {
     case carry:
       doing = "the assistant carries the specimen away";
       break;
-    case remove:
-      return "stitch " + std::to_string(stitched_ + 1) + ": " + sewing_->doing();
     case take_holder:
       doing = "take the needle holder";
       break;
     case sew:
+    case remove:
       return "stitch " + std::to_string(stitched_ + 1) + ": " + sewing_->doing();
     case carry_needle:
       doing = "stitch " + std::to_string(stitched_ + 1) + ": carry the needle to the right";

@@ -15,7 +15,6 @@ namespace {
 
 constexpr float kNearestCut = 2e-3f, kFarthestCut = 16e-3f;  // [m] along the strand, from where it leaves the tissue
 constexpr float kBladesClear = 2e-3f;                        // [m] from any other thread
-constexpr Vec3 kCutFrom{0, 0.6f, 0.8f};                      // unit, from the blades along the shaft
 constexpr float kLaidAt = 0.16f;                             // [m] of the needle, from the center of the field
 constexpr float kLaidFree = 0.03f;                           // [m] from the thread of any other suture
 constexpr float kOverDrape = 0.004f, kOverField = 0.07f;     // [m]
@@ -85,8 +84,7 @@ bool Scripted::remove(const Snapshot& seen) {
     case down:
     case snip: {
       const size_t at = stage_ == over ? cut_at_ = node_to_remove(seen) : cut_at_;
-      const Vec3 x = normalized(cross(kCutFrom, node_at(seen, at + 1) - node_at(seen, at - 1)), {1, 0, 0});
-      const Pose goal{node_at(seen, at), from_axes(x, cross(kCutFrom, x), kCutFrom)};
+      const Pose goal = blades_at(seen, at);
       jaw(kNeedleHolder, kHalfOpen);
       if (stage_ == over) {
         cuts_before_ = count_cuts(seen);

@@ -198,6 +198,8 @@ class Scripted final : public Surgeon {
   bool cut(TaskKind kind, const Snapshot& seen);
   // The needle holder carries the tail's piece away: left in the field it would lie between jaws and tissue at the next stitch.
   size_t piece_grip(const Snapshot& seen, size_t end) const;
+  // Blades that come from above, the strand at a node between them.
+  Pose blades_at(const Snapshot& seen, size_t node) const;
   // [m] of a node from any other thread, its own suture's too.
   float room_to_cut(const Snapshot& seen, size_t node, float most) const;
   bool take_piece(const Snapshot& seen);

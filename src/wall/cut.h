@@ -3,8 +3,9 @@
 // divide a face, each part becomes an element with the face's shape at rest, the part's share of mass and stiffness (of
 // stiffness an eighth at least), and copies of the columns ("virtual nodes"). Two elements share a copy where a link over their
 // common edge is left. Rest shapes, frames and velocities are kept, so no element is ever badly shaped and mass is exact.
-// Cutting only removes links, so the old factor remains a valid bound of the stiffness. Copies share its row, plus a diagonal
-// part for their relative motion. A new factor is made when a piece comes free, or on request.
+// Cutting only removes links, so the old factor remains a valid bound of the stiffness, but for slivers, which stay below the
+// limit of the step. Copies share its row, plus a diagonal part for their relative motion. A new factor is made when a piece
+// comes free, or on request.
 //
 // The lips follow the path within half a cell (a sixteenth of an element's edge). The closed end of a slit reaches to the
 // last edge of a face that the path crossed: a slit that ends within a face opens only up to its edge.

@@ -348,6 +348,23 @@ TEST(Cut, leaves_slivers_that_bear_a_load) {
   EXPECT_LT(farthest_from_rest(w), 1e-4f);
 }
 
+// The largest stiffness that cuts can give: a face of slivers of four cells, each with an eighth instead of a sixteenth. With
+// the factor from before the cut, the step stays below its limit of 2.67.
+TEST(Cut, into_slivers_keeps_the_step_stable) {
+  Wall w = build_wall(small_tube());
+  const Raster& r = raster(true);
+  std::vector<Mark> marks;
+  for (uint32_t link = 0; link < r.inner; ++link) {
+    const auto block = [](uint32_t cell) { return cell / 16 * 4 + cell % 8 / 2; };
+    if (block(r.link[link].a) != block(r.link[link].b)) marks.push_back({24 * 4, link});
+  }
+  cut_links(w.model, w.state, w.scratch, marks);
+  ASSERT_EQ(w.state.topology.fragment.size(), 16u);
+  const float largest = largest_eigenvalue(w.model, w.state, w.scratch, true);
+  std::printf("largest eigenvalue %.2f, before any cut %.2f\n", largest, w.model.report.largest);
+  EXPECT_LT(largest, 2.67f);
+}
+
 // A bed that is far stiffer than the wall, and a sheet cut in two on it, the second time with a new factor: each half sinks by
 // the pressure over the bed's modulus, and no eigenvalue comes near the limit of the step.
 TEST(Cut, leaves_both_halves_of_a_sheet_on_their_bed) {
