@@ -17,11 +17,13 @@ constexpr float kRound = 0.3e-3f;  // [m] beyond a border
 // Cosine between a face and the direction out of the point's own wall: more is behind it. Of its own piece, of another one.
 constexpr float kBehindOwn = -0.3f, kBehind = 0.3f;
 // Grooves.
-constexpr float kTouching = 0.1e-3f;  // [m] a point so near to one face is looked at for others
-constexpr float kLike = 0.95f;        // cosine between normals: more is one face
-constexpr float kSame = 1e-6f;        // [m]
-constexpr float kAdjoin = 20e-6f;     // [m] from the plane of a face to the border of the next one
-constexpr float kWide = 0.5e-3f;      // [m] along it
+constexpr float kTouching = 0.1e-3f;                   // [m] a point so near to one face is looked at for others
+constexpr float kLike = 0.95f;                         // cosine between normals: more is one face
+constexpr float kSame = 1e-6f;                         // [m]
+constexpr float kAdjoin = 20e-6f;                      // [m] from the plane of a face to the border of the next one
+constexpr float kWide = 0.5e-3f;                       // [m] along it
+constexpr float kClosest = kDeep + kWide + kTouching;  // [m] a face beyond that has no part in a groove
+constexpr float kCloseBy = kClosest + 0.4e-3f;         // [m] of a column's close faces
 
 Vec3 director(const wall::State& s, uint32_t column) { return wall::vec3(s.motion.x[2 * column + 1]); }
 
@@ -51,8 +53,8 @@ bool is_behind(const wall::Model& m, const wall::State& s, const Surface& surfac
 // The nearest point of another part of the wall; a gap of 1e9 if there is none. known: the patch that had it in the last step,
 // or kNone. speed: of the lip [m/s]. reach [m]: how far it is sought, beside their motion. nearest_box [m]: becomes the least
 // distance to a face.
-Foot find_foot(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, const Lip& lip,
-               float speed, float reach, uint32_t known, float& nearest_box) {
+Foot find_foot(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search,
+               std::span<const uint32_t> faces, const Lip& lip, float speed, float reach, uint32_t known, float& nearest_box) {
   Foot best;
   best.gap = 1e9f;
   const auto reach_of = [&](const FaceBox& box) {
@@ -74,8 +76,7 @@ Foot find_foot(const wall::Model& m, const wall::State& s, const Surface& surfac
   };
   // Most likely still the nearest: the others need not be searched.
   if (known != wall::kNone) look(box_of(m, s, search, surface.patch[known].face), known);
-  for (uint32_t i = search.column_first[lip.column]; i < search.column_first[lip.column + 1]; ++i) {
-    const uint32_t face = search.column_face[i];
+  for (const uint32_t face : faces) {
     const FaceBox& box = box_of(m, s, search, face);
     const float far = least_distance(box, lip.at, 0);
     nearest_box = std::min(nearest_box, far);
@@ -99,16 +100,15 @@ bool make_groove(const Foot& a, const Foot& b) {
 
 // In a groove a point touches two faces, in a pit three. With the nearest one alone it jumps to and fro between them, and both
 // walls shake. Returns how many feet there are. Rims are strips with edges all along: they have one.
-uint32_t find_groove(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, const Lip& lip,
-                     std::array<Foot, 3>& foot) {
+uint32_t find_groove(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search,
+                     std::span<const uint32_t> faces, const Lip& lip, std::array<Foot, 3>& foot) {
   uint32_t feet = 1;
   if (lip.before.empty() || foot[0].gap > kTouching || surface.patch[foot[0].patch].side == 0 || surface.at_rim[lip.column])
     return feet;
   for (; feet < foot.size(); ++feet) {
     Foot& next = foot[feet];
     next.gap = kTouching;
-    for (uint32_t i = search.column_first[lip.column]; i < search.column_first[lip.column + 1]; ++i) {
-      const uint32_t face = search.column_face[i];
+    for (const uint32_t face : faces) {
       const FaceBox& box = box_of(m, s, search, face);
       if (least_distance(box, lip.at, 0) > kDeep) continue;
       for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
@@ -145,6 +145,29 @@ uint32_t place_of(const Lip& lip, const Foot& foot, uint32_t taken) {
   return best;
 }
 
+// Those of a column's faces that may be nearer to it than kClosest. The others are farther than `least` [m].
+std::span<const uint32_t> close_faces(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search,
+                                      uint32_t column, std::span<const uint32_t> all, float& least) {
+  SurfaceSearch::Close& close = search.column_close[column];
+  uint32_t* const list = &search.column_close_face[kClose * column];
+  const auto left = [&] { return close.within - 2 * static_cast<float>(search.moved - close.moved); };  // both may move
+  if (left() < kClosest) {
+    close = {{}, search.moved, 1e9f, 0};
+    std::array<Vec3, 3> at;
+    for (size_t i = 0; i < at.size(); ++i) at[i] = wall::place(wall::at_column(column, static_cast<float>(i) - 1), s.motion);
+    for (const uint32_t face : all) {
+      const FaceBox& box = box_of(m, s, search, face);
+      float far = std::min(least_distance(box, at[0], 0), least_distance(box, at[2], 0));
+      if (surface.at_rim[column]) far = std::min(far, least_distance(box, at[1], 0));
+      if (far < kCloseBy && close.count < kClose) list[close.count++] = face;
+      else close.within = std::min(close.within, far);
+    }
+  }
+  if (left() < kClosest) return all;
+  least = left();
+  return {list, close.count};
+}
+
 }  // namespace
 
 void find_lips(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search, float friction,
@@ -155,6 +178,9 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
   for (uint32_t c = 0; c < columns; ++c) {
     if (search.column_first[c] == search.column_first[c + 1] || (!fast && search.moved < search.column_due[c])) continue;
     float nearest_box = 1e9f;
+    std::span<const uint32_t> faces{&search.column_face[search.column_first[c]],
+                                    search.column_first[c + 1] - search.column_first[c]};
+    if (!fast) faces = close_faces(m, s, surface, search, c, faces, nearest_box);
     for (const float zeta : {-1.0f, 0.0f, 1.0f}) {
       if (zeta == 0 && !surface.at_rim[c]) continue;
       const wall::Weights w = wall::at_column(c, zeta);
@@ -166,7 +192,7 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       while (after != solver.last.end() && after->key >> 2 == key >> 2) ++after;
       const Lip lip{c, zeta, wall::place(w, s.motion), {last, after}};
       uint32_t& known = search.lip_patch[3 * c + static_cast<uint32_t>(zeta + 1)];
-      const Foot best = find_foot(m, s, surface, search, lip, speed, solver.reach, known, nearest_box);
+      const Foot best = find_foot(m, s, surface, search, faces, lip, speed, solver.reach, known, nearest_box);
       known = best.gap > 1e8f ? wall::kNone : best.patch;
       if (best.gap > 1e8f) continue;
       wall::Contact k;
@@ -178,7 +204,7 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
         continue;
       k.friction = friction;
       std::array<Foot, 3> foot{best};
-      const uint32_t feet = find_groove(m, s, surface, search, lip, foot);
+      const uint32_t feet = find_groove(m, s, surface, search, faces, lip, foot);
       uint32_t taken = 0;
       for (uint32_t i = 0; i < feet; ++i) {
         if (i > 0 && solver.contact.size() == solver.contact.capacity()) break;

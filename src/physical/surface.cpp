@@ -357,8 +357,10 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   node_first.reserve(nodes + 1), node_face.reserve(64 * nodes);
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
   near.reserve(2 * faces), far.reserve(2 * faces), box.resize(faces);
+  group_center.reserve(2 * faces / kGroup), group_radius.reserve(2 * faces / kGroup);
   lip_patch.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes),
       node_seen.reserve(nodes), close.reserve(nodes), close_face.reserve(kClose * nodes);
+  column_close.reserve(2 * columns), column_close_face.reserve(2 * kClose * columns);
 }
 
 namespace {
@@ -453,6 +455,36 @@ float PatchBox::to_box(Vec3 p) const {
   return std::sqrt(da * da + db * db + dn * dn) * 0.9999f;
 }
 
+namespace {
+
+void group_faces(SurfaceSearch& k) {
+  const size_t faces = k.center.size();
+  k.group_center.clear(), k.group_radius.clear();
+  for (size_t first = 0; first < faces; first += kGroup) {
+    const size_t last = std::min(first + kGroup, faces);
+    Vec3 center{};
+    for (size_t f = first; f < last; ++f) center += k.center[f] / static_cast<float>(last - first);
+    float radius = 0;
+    for (size_t f = first; f < last; ++f) radius = std::max(radius, distance(center, k.center[f]) + k.radius[f]);
+    k.group_center.push_back(center), k.group_radius.push_back(1.001f * radius);
+  }
+}
+
+// Calls visit(face) for each face whose ball is within `reach` of p, in their order.
+template <typename Visit>
+void each_near(const SurfaceSearch& k, Vec3 p, float reach, Visit visit) {
+  for (size_t g = 0; g < k.group_center.size(); ++g) {
+    const float around = k.group_radius[g] + reach;
+    if (length2(k.group_center[g] - p) > around * around) continue;
+    for (size_t f = g * kGroup; f < std::min((g + 1) * kGroup, k.center.size()); ++f) {
+      const float far = k.radius[f] + reach;
+      if (length2(k.center[f] - p) < far * far) visit(static_cast<uint32_t>(f));
+    }
+  }
+}
+
+}  // namespace
+
 void find_near(const wall::Model& m, const wall::State& s, const Surface& surface, const thread::State& thread,
                SurfaceSearch& k) {
   const size_t nodes = thread.nodes(), columns = wall::columns(s), faces = wall::elements(m, s.topology);
@@ -477,6 +509,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
       radius = std::max(radius, distance(center, mid(s, c.column[i])) + length(director(s, c.column[i])));
     k.center[f] = center, k.radius[f] = radius;
   }
+  group_faces(k);
   // Blocks of eight nodes share a sphere; thread that was cut is two threads, which may lie anywhere.
   k.node_first.clear(), k.node_face.clear();
   constexpr size_t kBlock = 8;
@@ -488,10 +521,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
     float radius = 0;
     for (size_t i = b; i < end; ++i) radius = std::max(radius, distance(center, thread.x.at(i)));
     k.near.clear();
-    for (uint32_t f = 0; f < faces; ++f) {
-      const float reach = radius + k.radius[f] + k.margin;
-      if (length2(k.center[f] - center) < reach * reach) k.near.push_back(f);
-    }
+    each_near(k, center, radius + k.margin, [&](uint32_t f) { k.near.push_back(f); });
     for (size_t i = b; i < end; ++i) {
       k.node_first.push_back(static_cast<uint32_t>(k.node_face.size()));
       for (const uint32_t f : k.near) {
@@ -507,6 +537,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
   k.column_due.assign(columns, 0), k.column_first.clear(), k.column_face.clear();
   k.lip_patch.assign(3 * columns, wall::kNone);
+  k.column_close.assign(columns, {}), k.column_close_face.resize(kClose * columns);
   const auto rest = [&](uint32_t column) {
     const uint32_t source = s.topology.source[column];
     return (m.mesh.outer[source] + m.mesh.inner[source]) * 0.5f;
@@ -516,9 +547,8 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
     if (s.topology.slot[c] == wall::kNone || surface.ghost[c]) continue;
     const Vec3 at = mid(s, c), at_rest = rest(c);
     const float half = length(director(s, c));
-    for (uint32_t f = 0; f < faces; ++f) {
-      const float reach = k.radius[f] + half + k.margin;
-      if (surface.first_of_face[f] == surface.first_of_face[f + 1] || length2(k.center[f] - at) > reach * reach) continue;
+    each_near(k, at, half + k.margin, [&](uint32_t f) {
+      if (surface.first_of_face[f] == surface.first_of_face[f + 1]) return;
       const Corners corner = corners_of(m, s.topology, f);
       // Columns of one part of the wall that are adjacent at rest are not paired.
       bool beside = false;
@@ -526,7 +556,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
         beside |= surface.piece[corner.column[i]] == surface.piece[c] &&
                   (corner.column[i] == c || distance(rest(corner.column[i]), at_rest) < 1.2f * surface.face_radius[f]);
       if (!beside) k.column_face.push_back(f);
-    }
+    });
   }
   k.column_first.push_back(static_cast<uint32_t>(k.column_face.size()));
 }

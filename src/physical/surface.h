@@ -83,6 +83,7 @@ struct PatchBox {
 PatchBox patch_box(const wall::Model& model, const wall::State& state, const Patch& patch);
 
 constexpr size_t kClose = 24;
+constexpr size_t kGroup = 16;  // faces with neighboring numbers lie together: what is far from all of them is far from each
 // Which faces are near which nodes and columns. Lists are kept until something has moved half their margin.
 struct SurfaceSearch {
   float margin = 2e-3f;  // [m]
@@ -93,6 +94,8 @@ struct SurfaceSearch {
   std::vector<uint32_t> column_first, column_face;  // per column: faces of other parts of the wall
   std::vector<Vec3> center;                         // [m] per face
   std::vector<float> radius;
+  std::vector<Vec3> group_center;  // [m] of kGroup faces in turn
+  std::vector<float> group_radius;
   uint32_t version = 0;
   uint32_t step = 0;                // counts steps, for the boxes
   std::vector<FaceBox> box;         // per face, made on first use in a step
@@ -114,6 +117,8 @@ struct SurfaceSearch {
   };
   std::vector<Close> close;
   std::vector<uint32_t> close_face;
+  std::vector<Close> column_close;  // the same of a column, on both sides of the wall; `node` is not used
+  std::vector<uint32_t> column_close_face;
   void reserve(const wall::Model& model, const wall::State& state, size_t nodes);
 };
 const FaceBox& box_of(const wall::Model& model, const wall::State& state, SurfaceSearch& search, uint32_t face);

@@ -97,5 +97,24 @@ TEST(Lips, what_is_pressed_together_neither_overlaps_nor_slides_nor_pulls) {
   EXPECT_LT(distance(pressed, held), 0.02f * length(pressed));
 }
 
+// Lists of near faces are kept from step to step. Two ends are pressed together, slid over each other by more than the margins
+// of such lists, and drawn apart.
+TEST(Lips, a_search_that_remembers_finds_what_a_new_one_finds) {
+  Pressed p;
+  size_t most = 0;
+  for (int i = 0; i < 240; ++i) {
+    const float slide = i % 120 < 60 ? 0.05f : -0.02f;
+    p.move(i < 60 ? Vec3{0, 0, -0.04f} : i < 200 ? Vec3{slide, 0.4f * slide, -2e-3f} : Vec3{0, 0, 0.05f});
+    State twin = p.s.state;
+    Scratch fresh(p.s.model, twin);
+    Hands hands;
+    step(p.s.model, twin, fresh, hands, *p.s.jobs);
+    p.s.run(0.001f);
+    ASSERT_EQ(hash_state(twin), hash_state(p.s.state)) << "step " << i;
+    most = std::max(most, p.s.state.lip.size());
+  }
+  EXPECT_GT(most, 40u);
+}
+
 }  // namespace
 }  // namespace catgut::physical
