@@ -24,6 +24,9 @@ constexpr float kTooShallow = 0.4f;     // of the wall, for a shallow bite
 constexpr float kDeeper = 0.0005f;      // [m]
 constexpr float kOutFor = 0.3f;         // [s] that a needle is out of the tissue before its bite counts as failed
 constexpr float kSlit = 0.001f;         // [m] torn by the needle on its way: it lies at an edge, or only in the surface
+constexpr float kMuchDeeper = 0.0008f;  // [m] after a wall that gave way
+constexpr float kTooHard = 1.5f;        // [N] on a needle that is driven, for kRidesUp: a wall that it passes takes less
+constexpr float kRidesUp = 0.2f;        // [s]
 constexpr int kMostMisses = 6;          // grasps at a tip that walls cover
 constexpr int kAgain = 2;               // times that a bite is made again from the start
 constexpr float kBeside = 0.002f;       // [m] from the place where it failed
@@ -131,7 +134,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     }
     case approach: {
       hold_or_rest(seen);
-      scooped_ = 0;
+      scooped_ = 0, hard_ = 0;
       frame_ = frame(seen, place_);
       if (bite().walls > 1 && seen.tool[kForceps].held == Held::tissue)  // midway between both edges, where it holds them
         frame_.at += frame_.along * (dot(seen.tool[kForceps].pose.p - frame_.at, frame_.along) + kYieldsBack);
@@ -171,6 +174,13 @@ bool Scripted::make_bite(const Snapshot& seen) {
         go(withdraw);
         return false;
       }
+      // A wall that rides up on the needle would be torn.
+      hard_ = length(seen.tool[kNeedleHolder].force) > kTooHard ? hard_ + dt_ : 0;
+      if (plan_.pull > 0 && hard_ > kRidesUp && passed < bite().walls) {
+        next_fix_ = -kMuchDeeper;
+        go(withdraw);
+        return false;
+      }
       // A shallow bite that holds too little is made again, deeper.
       if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
         next_fix_ = -kDeeper;
@@ -181,7 +191,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
         // The tip is misplaced: it did not enter, is not deep enough, or is too deep to exit.
         // Through the first wall but not the second, which was pushed away by millimeters, as soft walls are.
         const bool gave_way = passed > 0 && passed < bite().walls;
-        next_fix_ = gave_way ? -0.0008f : passed > 0 || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
+        next_fix_ = gave_way ? -kMuchDeeper : passed > 0 || !seen.active().needle.in_tissue ? -0.0003f : 0.0003f;
         go(withdraw);
       }
       return false;

@@ -244,6 +244,7 @@ class Scripted final : public Surgeon {
   size_t points_before_ = 0;  // suture points of the suture, when the sweep began
   Pose pull_from_;
   float scooped_ = 0;            // [m] by which this bite was lifted
+  float hard_ = 0;               // [s] that the needle has needed too much force
   float steady_ = 0;             // [s] of full tension
   std::array<float, 2> felt_{};  // [N] in the strands of a hand, smoothed
   float overloaded_ = 0;         // [s] that a pull has had more than the maximum load

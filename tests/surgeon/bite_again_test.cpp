@@ -108,6 +108,23 @@ TEST(Surgeon, withdraws_the_needle_when_it_slits_the_wall_instead_of_driving_it_
   stitch.expect_a_stitch();
 }
 
+// A wall that turns along the needle is taken along by it, with ever more force, until it tears. The hand feels that.
+TEST(Surgeon, withdraws_the_needle_when_a_wall_rides_up_on_it) {
+  OneStitch stitch(read_scene("interrupted"));
+  bool withdraws = false;
+  int felt = 0;  // ticks
+  stitch.sew([] {},
+             [&] {
+               withdraws |= stitch.doing("withdraw and retry");
+               if (withdraws || stitch.needle().channels == 0 || !stitch.doing("drive the needle")) return;
+               stitch.seen.tool[0].force = {0, 1.8f, 0}, ++felt;
+             });
+  EXPECT_TRUE(withdraws);
+  EXPECT_GT(felt, 10);
+  EXPECT_LT(felt, 20);
+  stitch.expect_a_stitch();
+}
+
 // Thread that runs between closed jaws behind what they hold is pulled along with it.
 TEST(Surgeon, sees_thread_between_its_jaws) {
   PictureModel picture;
