@@ -50,9 +50,9 @@ bool is_behind(const wall::Model& m, const wall::State& s, const Surface& surfac
   return dot(foot.normal, up) * lip.zeta > (own ? kBehindOwn : kBehind) * length(up);
 }
 
-// The nearest point of another part of the wall; a gap of 1e9 if there is none. known: the patch that had it in the last step,
-// or kNone. speed: of the lip [m/s]. reach [m]: how far it is sought, beside their motion. nearest_box [m]: becomes the least
-// distance to a face.
+// The nearest point of another part of the wall, on these faces; a gap of 1e9 if there is none. known: the patch that had it in
+// the last step, or kNone. speed: of the lip [m/s]. reach [m]: how far it is sought, beside their motion. nearest_box [m]:
+// becomes the least distance to a face.
 Foot find_foot(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search,
                std::span<const uint32_t> faces, const Lip& lip, float speed, float reach, uint32_t known, float& nearest_box) {
   Foot best;
