@@ -244,7 +244,13 @@ bool Scripted::act(const Task& task, const Snapshot& seen) {
     case TaskKind::pull_together:
       doing_ = name_of_bite() + "pull the thread";
       if (!pull(task.kind, seen)) return false;
-      if (plan_.pull > 0 && task.kind == TaskKind::pull_tail && !is_sound(seen)) return bite_again(seen);
+      if (plan_.pull > 0 && task.kind == TaskKind::pull_tail) {
+        if (!is_sound(seen)) return bite_again(seen);
+        if (is_caught(seen)) {
+          doing_ = name_of_bite() + "the thread is caught";
+          return gave_up_ = true, false;
+        }
+      }
       again_ = 0;
       return true;
     case TaskKind::hand_back:
@@ -333,6 +339,15 @@ bool Scripted::pull(TaskKind kind, const Snapshot& seen) {
   const float gently = std::clamp(2.0f * strength_ - length(seen.tool[kForceps].force), 0.02f, 1.0f);
   move(kForceps, {pull_from_.p + way * 0.3f, hand_[kForceps].pose.q}, gently * std::min(skill_.speed, 0.015f + 5 * slack));
   return false;
+}
+
+// The thread did not follow the needle: slack of the tail may be drawn into a snarl before its first hole.
+bool Scripted::is_caught(const Snapshot& seen) const {
+  constexpr float kTooLong = 0.02f;  // [m] of the tail
+  constexpr float kStrand = 0.04f;   // [m] the least with which a throw is wound
+  const size_t last = seen.active().thread_order.size() - 1;
+  return length_between(seen, 0, first_point_node(seen)) > skill_.tail + kTooLong &&
+         length_between(seen, last_point_node(seen), last) < kStrand;
 }
 
 float Scripted::open_seam(const Snapshot& seen) {

@@ -122,6 +122,7 @@ class Scripted final : public Surgeon {
   // The needle is out, and a wall has no thread in it or is not held any more. Inserts the tasks that make the bite again, up
   // to twice; false: it cannot be done.
   bool bite_again(const Snapshot& seen);
+  bool is_caught(const Snapshot& seen) const;  // what was pulled through is too short for a throw
   bool is_sound(const Snapshot& seen) const {  // thread runs through every wall of the bite
     return seen.active().suture_point.size() >= points_before_ + 2 * static_cast<size_t>(bite().walls);
   }

@@ -108,6 +108,30 @@ TEST(Surgeon, withdraws_the_needle_when_it_slits_the_wall_instead_of_driving_it_
   stitch.expect_a_stitch();
 }
 
+// Thread sticks in its first hole, as a snarl before it would. The strand that was drawn out is too short for a throw: wound
+// with it, the jaws would go down into the tissue.
+TEST(Surgeon, does_not_tie_a_stitch_whose_thread_is_caught) {
+  OneStitch stitch(read_scene("interrupted_tied"));
+  float most = 0;  // [N]
+  bool sticks = false, ties = false;
+  const auto hold_thread = [&] {
+    std::vector<thread::Eyelet>& eyelet = stitch.state->physical.world.thread.eyelet;
+    if (eyelet.empty() || !stitch.doing("pull the thread")) return;
+    eyelet.front().friction = 30, sticks = true;
+  };
+  stitch.sew(hold_thread, [&] {
+    for (const SuturePointView& p : stitch.seen.active().suture_point)
+      most = std::max({most, p.tension_needle, p.tension_free});
+    ties |= stitch.doing("throw");
+  });
+  std::printf("%s, at most %.2f N in the holes\n", stitch.surgeon->doing().c_str(), static_cast<double>(most));
+  EXPECT_TRUE(sticks);
+  EXPECT_FALSE(ties);
+  EXPECT_TRUE(stitch.surgeon->gave_up());
+  EXPECT_TRUE(stitch.doing("the thread is caught"));
+  EXPECT_LT(most, 4);
+}
+
 // A wall that turns along the needle is taken along by it, with ever more force, until it tears. The hand feels that.
 TEST(Surgeon, withdraws_the_needle_when_a_wall_rides_up_on_it) {
   OneStitch stitch(read_scene("interrupted"));
