@@ -12,7 +12,6 @@ namespace catgut::physical {
 namespace {
 
 constexpr float kBeside = 1.2e-3f;  // [m] of shaft outside a hole that does not touch the face: it leaves at a slant
-constexpr float kBackward = 5e-3f;  // [m/s] along its point, of a tip that scratches and does not enter
 constexpr float kTipRadius = 0.08e-3f;
 
 Vec3 place_of(const wall::Model& wm, const wall::State& ws, const wall::Point& p) {
@@ -303,10 +302,16 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     row.key = key(3, foot.patch), row.on_wall = true,
     row.point = load_point(wall::weights(wm, ws.topology, foot.point), ws.motion, foot.normal);
     row.axis = foot.normal, row.gap = foot.gap - kTipRadius, row.friction = law.tip_friction;
-    // A tip that is drawn backward over a face scratches it and does not enter.
-    const Vec3 onward = body.velocity + cross(body.spin, tip - center) - wall::velocity(row.point, ws.motion);
-    const bool enters = surface.patch[foot.patch].side != 0 && -dot(tangent, foot.normal) > law.least_slope &&
-                        dot(onward, tangent) > -kBackward && n.channels < kMaxChannels;
+    // It enters a face on which it pressed in the last step. Drawn backward it scratches the face, or sticks to it and drags it
+    // along: friction pulled it forward then, and it does not enter.
+    const uint64_t first = key(3, 0);
+    const auto felt = std::lower_bound(bodies.memory.begin(), bodies.memory.end(), first,
+                                       [](const RowMemory& r, uint64_t from) { return r.key < from; });
+    const bool touched = felt != bodies.memory.end() && felt->key - first < uint64_t{1} << 36;
+    const float slope = -dot(tangent, foot.normal), press = touched ? dot(felt->impulse, foot.normal) : 0;
+    const float pull = touched ? dot(felt->impulse + tangent * (press * slope), tangent) : 0;
+    const bool enters = surface.patch[foot.patch].side != 0 && slope > law.least_slope && press > 0 &&
+                        pull < law.least_slope * press * slope && n.channels < kMaxChannels;
     if (enters) row.along_limit = puncture_force(law, m.shape) * h;
     n.tip_row = static_cast<uint32_t>(k.row.size()), n.tip_on = foot.point;
     add(row, tip - foot.normal * kTipRadius);

@@ -481,6 +481,36 @@ TEST(Needle, withdrawn_from_a_started_channel_it_leaves_nothing) {
     EXPECT_NEAR(wall::outer(bench.state.wall, c).z, 1.25e-3f, 0.05e-3f);
 }
 
+// The tip leans on the sheet at a slant and is pressed into it more and more, beyond what punctures. Drawn backward at the same
+// time, it scratches the sheet or drags it along, and does not enter, however slowly; drawn forward, it enters.
+TEST(Needle, drawn_backward_it_does_not_enter) {
+  for (const float way : {-1.0f, 1.0f})
+    for (const float speed : {2e-3f, 3e-3f, 4e-3f, 10e-3f}) {
+      Bench bench;
+      const uint32_t n = bench.add_needle({}, {});
+      const NeedleModel& needle = bench.model.needles.needle[0];
+      Pose hand = on_circle(needle, {0.015f, 0.0107f, 0.02f}, 1.5f * kPi - 0.36f - needle.shape.arc);
+      const Vec3 tip = tip_of(needle, hand), tangent = arc_tangent(needle, hand, needle.shape.arc);
+      ASSERT_NEAR(tangent.z, -0.352f, 0.01f);
+      hand.p += Vec3{0.015f, 0.0107f, 1.35e-3f} - tip;
+      place_body(bench.model.bodies.body[n], bench.body(n), hand, 0);
+      bench.start();
+      bool entered = false;
+      float most = 0;  // [N]
+      for (int i = 0; i < 6000 && !entered && most < 2; ++i) {
+        hand.p += Vec3{way * std::copysign(speed, tangent.x), 0, -0.5f * speed} * 1e-3f;
+        bench.target[n] = {hand, true};
+        bench.step();
+        entered |= (bench.state.needle[0].events & kEntered) != 0;
+        most = std::max(most, length(bench.body(n).force));
+      }
+      std::printf("%s %.0f mm/s: %s, %.2f N\n", way < 0 ? "backward" : "forward", 1e3 * static_cast<double>(speed),
+                  entered ? "entered" : "stayed out", static_cast<double>(most));
+      EXPECT_EQ(entered, way > 0);
+      EXPECT_GT(most, 0.8f);
+    }
+}
+
 // A hand moves a needle that is through the sheet once along y, across the plane of its arc, to the sheet's border. The tissue
 // is a spring between needle and channel. At the strength of a bite the needle tears a slit, which is as long as its way.
 TEST(Needle, drawn_across_its_channel_it_tears_a_slit_with_the_strength_of_a_bite) {
