@@ -16,8 +16,9 @@ constexpr void reflect(auto& a, Like<KnotThrow> auto& t) {
 }
 
 constexpr void reflect(auto& a, Like<Event> auto& e) {
-  a.at_most(e.kind, EventKind::piece_freed), a(e.who), a(e.which), a(e.value), a(e.where);
-  a.at_most(e.fault, Fault::bite_in_char), a.at_most(e.reason, LoopReason::too_deep), a(e.suture), a(e.tick);
+  const auto before = [](auto count) { return static_cast<uint32_t>(count) - 1; };
+  a.at_most(e.kind, before(EventKind::count_)), a(e.who), a(e.which), a(e.value), a(e.where);
+  a.at_most(e.fault, before(Fault::count_)), a.at_most(e.reason, before(LoopReason::count_)), a(e.suture), a(e.tick);
 }
 constexpr void reflect(auto& a, Like<EventList> auto& e) { a(e.tick), a(e.list); }
 
@@ -55,7 +56,7 @@ constexpr void reflect(auto& a, Like<SutureView> auto& s) {
 constexpr void reflect(auto& a, Like<TopologyView> auto& t) { a(t.version), a(t.pieces), a.cache(t.picture); }
 constexpr void reflect(auto& a, Like<Scar> auto& s) { a(s.burnt), a(s.depth), a(s.blood); }
 constexpr void reflect(auto& a, Like<BleedingView> auto& b) { a(b.at), a(b.flow), a(b.lost); }
-constexpr void reflect(auto& a, Like<WoundView> auto& w) { a(w.bleeding), a(w.thermal_spread), a(w.damaged); }
+constexpr void reflect(auto& a, Like<WoundView> auto& w) { a(w.bleeding), a(w.thermal_spread), a(w.damaged), a(w.freed_at); }
 constexpr void reflect(auto& a, Like<Snapshot> auto& s) {
   a(s.tick), a(s.time_s), a(s.topology), a(s.particle), a(s.rotation), a(s.tool), a(s.instrument), a(s.suture),
       a(s.active_suture), a(s.settled);

@@ -42,6 +42,29 @@ void step_both(const Model& model, State& state, const TickInput& input, Jobs& j
   ASSERT_EQ(bytes_of(went_on), bytes_of(loaded)) << "tick " << input.tick;
 }
 
+// Events of the last tick are in the state: a stage may begin in the tick in which something was cut or torn.
+TEST(SaveLoad, takes_every_event_and_fault) {
+  const SceneSpec scene = read_scene("stay");
+  const std::shared_ptr<const Model> model = build_model(scene);
+  StatePtr state = initial_state(*model), other = initial_state(*model);
+  const auto good = [&](const Event& event) {
+    state->event.list.assign(1, event);
+    load_state(*model, *other, save_state(*model, *state));
+    EXPECT_EQ(bytes_of(other->event), bytes_of(state->event));
+  };
+  Event event;
+  for (int kind = 0; kind < static_cast<int>(EventKind::count_); ++kind) {
+    event.kind = static_cast<EventKind>(kind);
+    EXPECT_NO_THROW(good(event)) << event_name(event.kind);
+  }
+  for (int fault = 0; fault < static_cast<int>(Fault::count_); ++fault) {
+    event.fault = static_cast<Fault>(fault);
+    EXPECT_NO_THROW(good(event)) << fault_name(event.fault);
+  }
+  event.fault = Fault::none, event.kind = EventKind::count_;
+  EXPECT_THROW(good(event), InputError);
+}
+
 class EveryScene : public testing::TestWithParam<const char*> {};
 
 TEST_P(EveryScene, saved_and_loaded_at_every_seventh_tick_goes_on_as_if_nothing_had_happened) {
