@@ -2,7 +2,18 @@
 // device: see tray.h.
 #include "device/tray.h"
 
+#include <algorithm>
+
 namespace catgut {
+
+namespace {
+
+bool is_assistants(const Snapshot& seen, size_t instrument) {
+  return std::any_of(seen.tool.begin() + 2, seen.tool.end(),
+                     [&](const ToolView& t) { return t.instrument == static_cast<int>(instrument); });
+}
+
+}  // namespace
 
 Command next_from_tray(const Snapshot& seen, size_t hand) {
   const size_t n = seen.instrument.size();
@@ -26,7 +37,7 @@ Command park_or_take_up(const Snapshot& seen, size_t hand) {
   for (size_t i = 0; i < seen.instrument.size(); ++i) {
     const InstrumentView& v = seen.instrument[i];
     const float d = distance(v.pose.p, tool.hand.p);
-    if (v.place != InstrumentPlace::parked || d >= best) continue;
+    if (!(v.place == InstrumentPlace::parked || (v.held == Held::tissue && is_assistants(seen, i))) || d >= best) continue;
     best = d;
     found = {CommandKind::unpark, static_cast<uint8_t>(hand), static_cast<uint16_t>(i)};
   }

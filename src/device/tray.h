@@ -9,8 +9,8 @@ namespace catgut {
 // The next instrument on the tray, in the scene's order: swapped with the hand's, or taken by an empty hand. kind none:
 // the tray is empty.
 Command next_from_tray(const Snapshot& seen, size_t hand);
-// A hand whose instrument holds something parks it, one with an instrument lays it down, an empty one takes the nearest parked
-// instrument. kind none: there is none.
+// A hand whose instrument holds something parks it, one with an instrument lays it down, an empty one takes the nearest one
+// that is parked, or that an assistant holds on tissue. kind none: there is none.
 Command park_or_take_up(const Snapshot& seen, size_t hand);
 
 }  // namespace catgut

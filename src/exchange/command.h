@@ -14,7 +14,7 @@ enum class CommandKind : uint8_t {
   swap,        // lays down the instrument in the hand and takes instrument `argument` from the tray
   lay_down,    // releases what is held and puts the instrument in its place on the tray
   park,        // leaves the clamp closed on what it holds; the hand is empty then
-  unpark,      // the empty hand takes the parked instrument `argument` in its present pose
+  unpark,      // the empty hand takes instrument `argument`, parked or held on tissue by an assistant, in its present pose
   new_suture,  // replaces suture `argument` by a new needle and thread
   cut,         // cuts the thread of suture `argument` at the jaws
   // Physical mechanics: the clamp on the fixed end of bowel `argument` moves during this tick, toward its opening and back to

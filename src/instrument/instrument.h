@@ -42,7 +42,14 @@ struct InstrumentState {
   InstrumentPlace place = InstrumentPlace::tray;
   uint8_t hand = kNoHand;  // that holds it
   uint32_t suture = 0;     // index of the held needle's or thread's suture
+  bool latched = false;    // a clamp that was taken up on tissue: closed until the hand has closed its jaw input
 };
+
+// The jaw of an instrument in a hand, from the hand's input.
+inline float follow_jaw(InstrumentState& tool, const InstrumentModel& kind, float input) {
+  tool.latched = tool.latched && input > kind.jaw.closed;
+  return tool.latched ? tool.jaw : input;
+}
 
 // All models of the table, in order.
 const std::vector<InstrumentModel>& instrument_table();

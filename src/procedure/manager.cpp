@@ -19,8 +19,7 @@ constexpr void reflect(auto& a, Like<StageRecord> auto& r) {
 constexpr void reflect(auto& a, Like<ErrorNote> auto& n) { a(n.tick), a(n.stage), a(n.error); }
 constexpr void reflect(auto& a, Like<ProcedureRun> auto& r) {
   a(r.begun), a(r.stage), a(r.record), a(r.error), a(r.tick_s), a(r.events), a(r.faults), a(r.bites), a(r.throws);
-  a(r.peak_force), a(r.peak_tension), a(r.path), a(r.bite_length), a(r.bite_depth), a(r.bite_angle), a(r.opening_start),
-      a(r.freed_at);
+  a(r.peak_force), a(r.peak_tension), a(r.path), a(r.bite_length), a(r.bite_depth), a(r.bite_angle), a(r.opening_start);
   a(r.tip), a(r.raised);
 }
 
@@ -67,7 +66,6 @@ void observe(ProcedureRun& run, const Snapshot& seen) {
     if (e.kind == EventKind::technique_fault && e.fault < Fault::count_) ++run.faults[static_cast<size_t>(e.fault)];
     if (e.kind == EventKind::tip_entered) run.bite_angle = e.value;
     if (e.kind == EventKind::throw_locked) ++run.throws;
-    if (e.kind == EventKind::piece_freed) run.freed_at = e.where;
     if (e.kind != EventKind::bite_completed) continue;
     ++run.bites;
     run.bite_length = e.value;

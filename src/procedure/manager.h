@@ -52,7 +52,6 @@ struct ProcedureRun {
   float path = 0;                                         // [m] of both tips
   float bite_length = 0, bite_depth = 0, bite_angle = 0;  // [m], [m], [rad] of the last one
   float opening_start = 0;                                // [m^2]
-  Vec3 freed_at;                                          // [m] center of the last piece of tissue that came free, then
   std::array<Vec3, 2> tip{};                              // [m]
   std::vector<uint8_t> raised;                            // per error: its conditions hold
 };

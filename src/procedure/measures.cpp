@@ -105,11 +105,11 @@ std::vector<Measure> table() {
              std::count_if(s.wound.bleeding.begin(), s.wound.bleeding.end(), [](const BleedingView& b) { return b.flow > 0; }));
        }},
       {"specimen_mm", "mm", "from where a piece came free to the nearest instrument that holds tissue; 0: none did",
-       [](Seen s, Run r) {
-         if (r.freed_at == Vec3{}) return 0.0;
+       [](Seen s, Run) {
+         if (s.wound.freed_at == Vec3{}) return 0.0;
          double least = kNone;
          for (const InstrumentView& i : s.instrument)
-           if (i.held == Held::tissue) least = std::min(least, mm(distance(i.pose.p, r.freed_at)));
+           if (i.held == Held::tissue) least = std::min(least, mm(distance(i.pose.p, s.wound.freed_at)));
          return least;
        }},
       {"stitch_mm", "mm", "distance of the first and the last suture point of the suture in hand",

@@ -113,7 +113,9 @@ void Live::Work::prepare() {
     begin_run(run, procedure, now, dt);
     demonstrator.surgeon = scripted_surgeon(scene, picture);
     published.preparing = published.prepared = true;
-    while (run.stage < first && !demonstrator.surgeon->done() && !quit.load(std::memory_order_relaxed)) {
+    const auto burns = [](const InstrumentView& i) { return i.pen != PenMode::off; };
+    const auto pen_is_on = [&] { return std::any_of(now.instrument.begin(), now.instrument.end(), burns); };
+    while ((run.stage < first || pen_is_on()) && !demonstrator.surgeon->done() && !quit.load(std::memory_order_relaxed)) {
       tick(false);
       update_run(run, procedure, now);
       if (result.ticks % kViewTicks == 0) publish_view();

@@ -70,8 +70,10 @@ void report_freed(const Model& model, State& state, size_t instrument, uint32_t 
   const Piece* freed = nullptr;
   for (const Piece& p : of)
     if (p.beside && !p.held && p.mass > 0 && (!freed || p.mass < freed->mass)) freed = &p;
-  if (freed)
-    report(state, EventKind::piece_freed, instrument, state.physical.cutting.pieces, freed->mass, freed->moment / freed->mass);
+  if (!freed) return;
+  Cutting& c = state.physical.cutting;
+  c.freed_at = freed->moment / freed->mass;
+  report(state, EventKind::piece_freed, instrument, c.pieces, freed->mass, c.freed_at);
 }
 
 // What has come free has no supply: its vessels are empty.

@@ -48,7 +48,8 @@ void put_in_hand(State& state, size_t i, size_t hand, const Pose& pose, float ja
   h.grip = h.pose == pose ? Pose{} : inverse(h.pose) * pose;
   tool.place = InstrumentPlace::hand;
   tool.hand = static_cast<uint8_t>(hand);
-  tool.jaw = jaw;
+  tool.latched = tool.held == Held::tissue;
+  tool.jaw = tool.latched ? tool.jaw : jaw;
   state.solver.weld[i].local_a = h.grip == Pose{} ? Pose{} : inverse(h.grip);
   state.solver.body_force[i] = {};
 }
@@ -85,6 +86,13 @@ bool has_room(const State& state, const HandState& hand) {
   return true;
 }
 
+// A clamp that an assistant has closed on tissue.
+bool is_held_by_assistant(const State& state, size_t i) {
+  if (i >= state.suture.instrument.size()) return false;
+  const InstrumentState& tool = state.suture.instrument[i];
+  return tool.place == InstrumentPlace::hand && tool.hand >= 2 && tool.held == Held::tissue;
+}
+
 bool carry_out(const Model& model, State& state, const TickInput& input, const Command& c) {
   if (c.kind == CommandKind::cut || c.kind == CommandKind::new_suture) return true;  // stages of their own
   if (moves_clamp(c.kind)) return has_clamp(model, c.argument);                      // before each step
@@ -104,9 +112,11 @@ bool carry_out(const Model& model, State& state, const TickInput& input, const C
     case CommandKind::take:
     case CommandKind::unpark:
       if (h.instrument >= 0) return false;
-      if (is_at(InstrumentPlace::parked)) {
+      if (is_at(InstrumentPlace::parked) || (c.kind == CommandKind::unpark && is_held_by_assistant(state, i))) {
         const Pose pose = state.solver.body[i].pose();
-        return distance(pose.p, h.pose.p) <= kReach && take(pose);
+        if (distance(pose.p, h.pose.p) > kReach) return false;
+        if (is_at(InstrumentPlace::hand)) state.hand[state.suture.instrument[i].hand].instrument = -1;
+        return take(pose);
       }
       if (c.kind == CommandKind::unpark || !is_at(InstrumentPlace::tray) || !has_room(state, h)) return false;
       place_at(state.solver.body[i], h.pose);

@@ -89,7 +89,7 @@ void set_targets(const Model& model, State& state, const TickInput& input, Physi
     }
     if (tool.place != InstrumentPlace::hand || !t.connected) continue;
     t.pose = weld.target * inverse(weld.local_a);
-    if (input.hand[tool.hand].connected) tool.jaw = input.hand[tool.hand].jaw;
+    if (input.hand[tool.hand].connected) tool.jaw = follow_jaw(tool, kind, input.hand[tool.hand].jaw);
     const physical::Gripped what = state.physical.world.bodies.body[i].grip.what;
     // Fingers that hold something rest where the jaws grasp: from there on they open them by what their stroke is worth.
     const float gap = 2 * bodies.body[i].hinge_z * kWideOpen * (tool.jaw - kind.jaw.closed);

@@ -110,7 +110,7 @@ void grasp(SutureContext& c, const HandInputs& input) {
     InstrumentState& hand = c.state.instrument[who];
     const InstrumentModel& kind = c.suture.instrument[who];
     if (hand.place != InstrumentPlace::hand) continue;
-    const float jaw = input[hand.hand].connected ? input[hand.hand].jaw : hand.jaw;
+    const float jaw = input[hand.hand].connected ? follow_jaw(hand, kind, input[hand.hand].jaw) : hand.jaw;
     const bool closing = hand.jaw > kind.jaw.closed && jaw <= kind.jaw.closed;
     hand.jaw = jaw;
     if (hand.held != Held::nothing) {

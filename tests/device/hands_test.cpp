@@ -677,6 +677,12 @@ TEST(Tray, the_key_goes_round_what_lies_there) {
   c = park_or_take_up(seen, 0);
   EXPECT_EQ(c.kind, CommandKind::unpark);
   EXPECT_EQ(c.argument, 2);
+  // An assistant's clamp on tissue is as good as a parked one, and the nearest one is taken.
+  seen.tool[2].instrument = 3, seen.tool[0].hand.p = seen.instrument[3].pose.p = {0.1f, 0, 0};
+  seen.instrument[3].place = InstrumentPlace::hand;
+  EXPECT_EQ(park_or_take_up(seen, 0).argument, 2) << "the assistant's holds nothing";
+  seen.instrument[3].held = Held::tissue;
+  EXPECT_EQ(park_or_take_up(seen, 0).argument, 3);
   EXPECT_EQ(park_or_take_up(seen, 1).kind, CommandKind::lay_down);
   seen.tool[1].held = Held::tissue;
   EXPECT_EQ(park_or_take_up(seen, 1).kind, CommandKind::park);

@@ -278,6 +278,19 @@ class Stylus {
       return false;
     });
   }
+  // As go(), of the hand alone: what it holds is held back by the tissue.
+  bool hand_to(const std::function<Pose()>& to, float near) {
+    double moved = -1;
+    return until([&] {
+      const Vec3 off = to().p - seen().tool[0].hand.p;
+      if (length(off) < near) return true;
+      if (seen().time_s < moved + kReaction) return false;
+      moved = seen().time_s;
+      wish_ += off * (0.6f * std::min(1.0f, 0.02f / length(off)));
+      arm_.wish(0, wish_, turn_, 0);
+      return false;
+    });
+  }
   // Until `done`: buttons as the devices have them, 1 the jaw's, 2 beside it; pressed so many times in half a second.
   bool press(int button, int times, const std::function<bool()>& done) {
     for (int attempt = 0; attempt < 5; ++attempt) {  // a double press may come late where the machine is late
@@ -391,6 +404,28 @@ class AtTheArms {
     return step("switch it off", me.press(2, 2, [&] { return pen() == PenMode::off; }));
   }
 
+  // Each vessel that bleeds, with the pen and its pedal.
+  bool coagulate(Stylus& me) {
+    if (!step("take the pen", take(me, "cautery"))) return false;
+    for (size_t i = 0; i < me.seen().wound.bleeding.size(); ++i) {
+      const auto bleeds = [&] { return me.seen().wound.bleeding[i].flow > 0; };
+      if (!bleeds()) continue;
+      float above = 0.02f;
+      const auto tip = [&] {
+        const Vec3 place = me.seen().wound.bleeding[i].at, from = place - desk.picture().focus;
+        return tip_on({place, normalized(Vec3{from.x, 0, from.z}), {0, 1, 0}}, above);
+      };
+      if (!step("over the vessel", me.go(tip, 0.004f))) return false;
+      above = 0;
+      me.go(tip, 0.001f);
+      for (int attempt = 0; attempt < 4 && bleeds(); ++attempt) desk.press_for("F8", 1);
+      if (!step("stop the bleeding", !bleeds())) return false;
+      above = 0.02f;
+      if (!step("off the vessel", me.go(tip, 0.004f))) return false;
+    }
+    return true;
+  }
+
   XMouse desk;
   std::string stopped_at;
 
@@ -429,6 +464,41 @@ TEST_F(StitchAtTheWindow, an_operation_is_resumed_at_its_cut_by_simulated_arms) 
       true);
   EXPECT_EQ(at.stopped_at, "");
   expect_a_cut(at.desk, clamps);
+}
+
+// The third stage: the surgeon has clamped and cut. The user stops the bleeding, takes the assistant's clamp over and carries
+// the specimen away.
+TEST_F(StitchAtTheWindow, the_specimen_is_removed_by_simulated_arms) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  AtTheArms at(x_->display, "altemeier");
+  if (!at.desk.ready()) GTEST_SKIP() << "no XTest here";
+  at.desk.lesson = "altemeier";
+  at.desk.prepare = [](PlayOptions& options) {
+    AtTheArms::connect(options);
+    options.tutorial = false, options.stage = "remove";
+  };
+  at.sit(
+      [&](Stylus& me) {
+        if (!at.coagulate(me)) return;
+        at.desk.press("k");
+        if (!at.step("lay the pen down", me.until([&] { return me.seen().tool[0].instrument < 0; }))) return;
+        const auto beside = [&] {
+          Pose p = me.seen().tool[0].hand;
+          p.p = me.seen().tool[2].pose.p + Vec3{-0.03f, 0.03f, 0};
+          return p;
+        };
+        if (!at.step("to the assistant's clamp", me.hand_to(beside, 0.01f))) return;
+        at.desk.press("k");
+        if (!at.step("take it over", me.until([&] { return me.seen().tool[0].held == Held::tissue; }))) return;
+        Pose aside = me.seen().tool[0].hand;
+        aside.p += Vec3{-0.15f, 0.1f, 0};
+        at.step("carry it away", me.hand_to([&] { return aside; }, 0.01f));
+        at.step("the stage is done", me.until([&] { return at.desk.lesson_step() == 3; }));
+      },
+      true);
+  EXPECT_EQ(at.stopped_at, "");
+  EXPECT_EQ(at.desk.lesson_run().stage, 3u) << "clamp, cut, remove, bite";
+  EXPECT_EQ(at.desk.lesson_run().error.size(), 0u);
 }
 
 TEST_F(StitchAtTheWindow, scissors_cut_by_simulated_arms) {

@@ -190,6 +190,46 @@ TEST(Instrument, a_clamp_is_parked_holds_on_and_is_taken_up_again) {
   EXPECT_EQ(f.count(EventKind::instrument_refused), 0u);
 }
 
+// A ratchet: the jaw of a device is open after it has worked with something else. Closed and opened, it lets go.
+TEST(Instrument, a_clamp_that_an_open_hand_takes_up_holds_on_until_the_hand_has_closed) {
+  for (const char* kind : {"guided", "physical"}) {
+    Field f(scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\n[mechanics]\nkind = \"" +
+                       std::string(kind) + "\"\n"));
+    f.input.hand[0].jaw = 1;
+    f.run(30);
+    ASSERT_EQ(f.seen.instrument[0].held, Held::tissue) << kind;
+    f.connect(0, f.seen.instrument[0].pose.p);
+    f.order(CommandKind::unpark, 0, 0);
+    ASSERT_EQ(f.seen.tool[0].instrument, 0) << kind;
+    f.run(30);
+    EXPECT_EQ(f.seen.tool[0].held, Held::tissue) << kind;
+    f.input.hand[0].jaw = 0;
+    f.run(5);
+    EXPECT_EQ(f.seen.tool[0].held, Held::tissue) << kind;
+    f.input.hand[0].jaw = 1;
+    f.run(30);
+    EXPECT_EQ(f.seen.tool[0].held, Held::nothing) << kind;
+  }
+}
+
+TEST(Instrument, a_clamp_is_taken_over_from_an_assistant_and_not_from_the_other_hand) {
+  for (const char* where : {"assistant_right", "left"}) {
+    const size_t other = where == std::string("left") ? 1 : 2;
+    Field f(scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\n"));
+    f.run(30);
+    f.connect(other, f.seen.instrument[0].pose.p);
+    f.order(CommandKind::unpark, other, 0);
+    ASSERT_EQ(f.seen.tool[other].held, Held::tissue);
+    f.connect(0, f.seen.instrument[0].pose.p + Vec3{0.05f, 0, 0});
+    f.order(CommandKind::unpark, 0, 0);
+    f.run(30);
+    EXPECT_EQ(f.seen.tool[other == 2 ? 0 : 1].instrument, 0) << where;
+    EXPECT_EQ(f.seen.tool[other == 2 ? 0 : 1].held, Held::tissue) << where;
+    EXPECT_EQ(f.seen.tool[other == 2 ? 2 : 0].instrument, -1) << where;
+    EXPECT_EQ(f.count(EventKind::tissue_released), 0u);
+  }
+}
+
 // At equilibrium the tissue carries the stated force, and deforms in proportion to it.
 TEST(Instrument, a_parked_clamp_pulls_with_the_stated_force) {
   Field bare(scene_with(""));

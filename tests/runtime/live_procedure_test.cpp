@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <thread>
 
 #include "procedure/procedure_file.h"
@@ -98,6 +99,20 @@ TEST(LiveProcedure, a_stage_starts_from_a_saved_state) {
   EXPECT_LT(desk.seen.tick, 400u) << "the surgeon did not work";
   desk.live->finish();
   std::remove(file.c_str());
+}
+
+// The surgeon has clamped and cut. What the stage asks about was measured before it began.
+TEST(LiveProcedure, a_stage_after_the_cut_knows_where_the_specimen_came_free_and_no_pen_is_on) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  const Procedure p = read_procedure("altemeier");
+  Desk desk(p, 2, false);
+  ASSERT_TRUE(desk.until([](const LiveStatus& s) { return !s.settling && s.procedure.begun && !s.preparing; }));
+  EXPECT_EQ(desk.live->status().procedure.stage, 2u);
+  EXPECT_EQ(desk.seen.topology.pieces, 3u) << "two tubes and the specimen";
+  EXPECT_LT(length(desk.seen.wound.freed_at), 0.03f);
+  EXPECT_GT(length(desk.seen.wound.freed_at), 1e-4f);
+  for (const InstrumentView& i : desk.seen.instrument) EXPECT_EQ(i.pen, PenMode::off);
+  desk.live->finish();
 }
 
 }  // namespace
