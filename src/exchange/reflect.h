@@ -56,7 +56,9 @@ constexpr void reflect(auto& a, Like<SutureView> auto& s) {
 constexpr void reflect(auto& a, Like<TopologyView> auto& t) { a(t.version), a(t.pieces), a.cache(t.picture); }
 constexpr void reflect(auto& a, Like<Scar> auto& s) { a(s.burnt), a(s.depth), a(s.blood); }
 constexpr void reflect(auto& a, Like<BleedingView> auto& b) { a(b.at), a(b.flow), a(b.lost); }
-constexpr void reflect(auto& a, Like<WoundView> auto& w) { a(w.bleeding), a(w.thermal_spread), a(w.damaged), a(w.freed_at); }
+constexpr void reflect(auto& a, Like<WoundView> auto& w) {
+  a(w.bleeding), a(w.thermal_spread), a(w.damaged), a(w.freed_mass), a(w.freed_at);
+}
 constexpr void reflect(auto& a, Like<Snapshot> auto& s) {
   a(s.tick), a(s.time_s), a(s.topology), a(s.particle), a(s.rotation), a(s.tool), a(s.instrument), a(s.suture),
       a(s.active_suture), a(s.settled);

@@ -150,7 +150,8 @@ struct WoundView {
   std::vector<BleedingView> bleeding;
   float thermal_spread = 0;  // [m] largest distance of heat-damaged tissue from the path of the pen's tip
   float damaged = 0;         // [m^2] heat-damaged tissue
-  Vec3 freed_at;             // [m] center of the last piece of tissue that came free, then; zero: none did
+  float freed_mass = 0;      // [kg] of the heaviest piece of tissue that came free; zero: none did
+  Vec3 freed_at;             // [m] its center, then
 };
 
 struct Snapshot {

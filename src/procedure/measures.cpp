@@ -104,9 +104,11 @@ std::vector<Measure> table() {
          return static_cast<double>(
              std::count_if(s.wound.bleeding.begin(), s.wound.bleeding.end(), [](const BleedingView& b) { return b.flow > 0; }));
        }},
-      {"specimen_mm", "mm", "from where a piece came free to the nearest instrument that holds tissue; 0: none did",
+      {"freed_g", "g", "mass of the heaviest piece of tissue that came free; slivers of a cut weigh milligrams",
+       [](Seen s, Run) { return 1e3 * static_cast<double>(s.wound.freed_mass); }},
+      {"specimen_mm", "mm", "from where the heaviest piece came free to the nearest instrument that holds tissue; 0: none did",
        [](Seen s, Run) {
-         if (s.wound.freed_at == Vec3{}) return 0.0;
+         if (s.wound.freed_mass == 0) return 0.0;
          double least = kNone;
          for (const InstrumentView& i : s.instrument)
            if (i.held == Held::tissue) least = std::min(least, mm(distance(i.pose.p, s.wound.freed_at)));

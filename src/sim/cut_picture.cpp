@@ -574,7 +574,7 @@ void publish_cut(const Model& model, const State& state, Snapshot& out) {
     out.wound.bleeding.push_back(
         {wall::place(wall::weights(model.physical->world.wall, wall.topology, b.at), wall.motion), b.flow, b.lost});
   out.wound.thermal_spread = c.excision.heat.spread, out.wound.damaged = c.excision.heat.area;
-  out.wound.freed_at = c.freed_at;
+  out.wound.freed_mass = c.freed_mass, out.wound.freed_at = c.freed_at;
   out.rotation.assign(model.solver.count, {});
   for (uint32_t i = 0; i < rest; ++i) out.rotation[2 * i] = out.rotation[2 * i + 1] = turned[i];
   for (uint32_t i = rest; i < turned.size(); ++i) {

@@ -72,8 +72,9 @@ void report_freed(const Model& model, State& state, size_t instrument, uint32_t 
     if (p.beside && !p.held && p.mass > 0 && (!freed || p.mass < freed->mass)) freed = &p;
   if (!freed) return;
   Cutting& c = state.physical.cutting;
-  c.freed_at = freed->moment / freed->mass;
-  report(state, EventKind::piece_freed, instrument, c.pieces, freed->mass, c.freed_at);
+  const Vec3 center = freed->moment / freed->mass;
+  if (freed->mass > c.freed_mass) c.freed_mass = freed->mass, c.freed_at = center;
+  report(state, EventKind::piece_freed, instrument, c.pieces, freed->mass, center);
 }
 
 // What has come free has no supply: its vessels are empty.

@@ -57,10 +57,11 @@ struct Cutting {
   std::vector<PenMode> mode;  // per instrument; empty: no instrument of the scene cuts tissue
   std::vector<uint8_t> shut;  // per instrument: scissors that have not opened since they closed, or were taken
   physical::Excision excision;
-  uint32_t pieces = 0;  // of the wall
-  Stroke stroke;        // of the active pen, or the last one
-  bool opened = false;  // the wall is cut through somewhere
-  Vec3 freed_at;        // [m] center of the last piece that came free, then
+  uint32_t pieces = 0;   // of the wall
+  Stroke stroke;         // of the active pen, or the last one
+  bool opened = false;   // the wall is cut through somewhere
+  float freed_mass = 0;  // [kg] of the heaviest piece that came free
+  Vec3 freed_at;         // [m] its center, then
   // Faults that are reported already: per suture, and per instrument until it lets go.
   std::vector<uint8_t> cut_at_suture, pulled;
   // Follows from the above (sim/cut_picture).
@@ -74,10 +75,10 @@ struct Cutting {
 constexpr void reflect(auto& a, Like<Cutting> auto& c) {
   if (c.mode.empty()) {
     a.cache(c.mode), a.cache(c.excision), a.cache(c.pieces), a.cache(c.stroke), a.cache(c.opened), a.cache(c.cut_at_suture);
-    a.cache(c.pulled), a.cache(c.shut), a.cache(c.freed_at);
+    a.cache(c.pulled), a.cache(c.shut), a.cache(c.freed_mass), a.cache(c.freed_at);
   } else {
     a(c.mode), a(c.shut), a(c.excision), a(c.pieces), a(c.stroke), a(c.opened), a(c.cut_at_suture), a(c.pulled);
-    a(c.freed_at);
+    a(c.freed_mass), a(c.freed_at);
   }
   a.cache(c.touched), a.cache(c.scar), a.cache(c.picture_of), a.cache(c.picture), a.cache(c.source);
 }
