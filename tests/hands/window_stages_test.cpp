@@ -413,7 +413,7 @@ class AtTheArms {
       float above = 0.02f;
       const auto tip = [&] {
         const Vec3 place = me.seen().wound.bleeding[i].at, from = place - desk.picture().focus;
-        return tip_on({place, normalized(Vec3{from.x, 0, from.z}), {0, 1, 0}}, above);
+        return tip_on({place, normalized(Vec3{from.x, 0, from.z}), {0, 1, 0}, 0}, above);
       };
       if (!step("over the vessel", me.go(tip, 0.004f))) return false;
       above = 0;
