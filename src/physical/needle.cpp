@@ -13,6 +13,7 @@ namespace {
 
 constexpr float kBeside = 1.2e-3f;  // [m] of shaft outside a hole that does not touch the face: it leaves at a slant
 constexpr float kTipRadius = 0.08e-3f;
+constexpr float kDrawnBack = 0.25f;  // of what a face pushes back along the needle: friction that pulls its tip forward by more
 
 Vec3 place_of(const wall::Model& wm, const wall::State& ws, const wall::Point& p) {
   return wall::place(wall::weights(wm, ws.topology, p), ws.motion);
@@ -311,7 +312,7 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     const float slope = -dot(tangent, foot.normal), press = touched ? dot(felt->impulse, foot.normal) : 0;
     const float pull = touched ? dot(felt->impulse + tangent * (press * slope), tangent) : 0;
     const bool enters = surface.patch[foot.patch].side != 0 && slope > law.least_slope && press > 0 &&
-                        pull < law.least_slope * press * slope && n.channels < kMaxChannels;
+                        pull < kDrawnBack * press * slope && n.channels < kMaxChannels;
     if (enters) row.along_limit = puncture_force(law, m.shape) * h;
     n.tip_row = static_cast<uint32_t>(k.row.size()), n.tip_on = foot.point;
     add(row, tip - foot.normal * kTipRadius);
