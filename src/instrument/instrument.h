@@ -43,6 +43,7 @@ struct InstrumentState {
   uint8_t hand = kNoHand;  // that holds it
   uint32_t suture = 0;     // index of the held needle's or thread's suture
   bool latched = false;    // a clamp that was taken up on tissue: closed until the hand has closed its jaw input
+  Vec3 parked_at;          // [m] grasp point when it was parked, where its cord draws with its whole force
 };
 
 // The jaw of an instrument in a hand, from the hand's input.

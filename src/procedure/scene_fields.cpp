@@ -75,6 +75,7 @@ const Field kField[] = {
     {"instrument", "where", "", 0, 0, "tray|right|left|assistant_right|assistant_left|parked", "on the tray, in a hand, or (a clamp) closed on tissue without a hand", INSTRUMENT(where)},
     {"instrument", "at", "m", -1, 1, nullptr, "parked: point whose nearest tissue surface is held", INSTRUMENT(at)},
     {"instrument", "pull", "N", -100, 100, nullptr, "parked: traction force instead of the weight; zero: the weight", INSTRUMENT(pull)},
+    {"instrument", "stretch", "m", 0, 1, nullptr, "parked: `pull` is that of an elastic cord, which is slack when the instrument has gone so far with it from where it was parked; 0: the pull is constant", INSTRUMENT(stretch)},
 
     {"thread", "particles", "", 2, 10000, nullptr, "thread particles from the free end to the needle", TOP(thread.particles)},
     {"thread", "spacing", "m", 0.0001, 0.1, nullptr, "rest distance of neighboring particles", TOP(thread.spacing)},

@@ -268,7 +268,7 @@ void add_instruments(Model& m, const SceneSpec& scene, Vec3 rim, const std::stri
   for (size_t i = 0; i < specs.size(); ++i) {
     const InstrumentSpec& spec = specs[i];
     const InstrumentModel& kind = m.suture.instrument[i];
-    m.pull.push_back(spec.pull);
+    m.cord.push_back({spec.pull, spec.stretch});
     // The tray: a row on the drape to the right, shafts toward the surgeon.
     m.tray.push_back({Vec3{rim.x + 0.16f + 0.03f * static_cast<float>(i), m.solver.ground + 0.006f, rim.z}, {}});
     InstrumentPicture picture;

@@ -54,6 +54,15 @@ void put_in_hand(State& state, size_t i, size_t hand, const Pose& pose, float ja
   state.solver.body_force[i] = {};
 }
 
+// Its weight, or the pull of its cord, which slackens as the instrument goes with it.
+void load_parked(const Model& model, State& state, size_t i) {
+  const Cord& cord = model.cord[i];
+  const Vec3 weight = model.solver.gravity / model.solver.body[i].inv_mass;
+  const float gone = dot(state.solver.body[i].x - state.suture.instrument[i].parked_at, normalized(cord.pull, {}));
+  const float slack = length2(cord.pull) == 0 ? 1 : cord.stretch > 0 ? std::clamp(gone / cord.stretch, 0.0f, 1.0f) : 0;
+  state.solver.body_force[i] = lerp(cord.pull, weight, slack);
+}
+
 void park_here(const Model& model, State& state, size_t i) {
   InstrumentState& tool = state.suture.instrument[i];
   tool.place = InstrumentPlace::parked;
@@ -61,8 +70,8 @@ void park_here(const Model& model, State& state, size_t i) {
   tool.jaw = 0;
   state.solver.weld[i].compliance = kOpenWeld;
   state.solver.body_collides[i] = 1;
-  const Vec3 weight = model.solver.gravity / model.solver.body[i].inv_mass;
-  state.solver.body_force[i] = length2(model.pull[i]) > 0 ? model.pull[i] : weight;
+  tool.parked_at = state.solver.body[i].x;
+  load_parked(model, state, i);
 }
 
 void lay_down(const Model& model, State& state, size_t hand) {
@@ -202,6 +211,8 @@ void handle_instruments(const Model& model, State& state, const TickInput& input
       const bool from_tray = c.kind == CommandKind::take || c.kind == CommandKind::swap;
       report(state, EventKind::instrument_refused, hand, c.argument, from_tray && !has_room(state, state.hand[hand]) ? 1 : 0);
     }
+  for (size_t i = 0; i < state.suture.instrument.size(); ++i)
+    if (state.suture.instrument[i].place == InstrumentPlace::parked) load_parked(model, state, i);
 }
 
 void follow_hands(const Model& model, State& state, const TickInput& input, float part) {

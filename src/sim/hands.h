@@ -14,8 +14,9 @@ void lay_out_instruments(const Model& model, State& state);
 // Once per tick, before everything else. When a hand connects, its instrument is placed at the hand's pose; it is not
 // dragged there through the tissue.
 void meet_hands(State& state, const TickInput& input);
-// Once per tick: processes take, swap, lay_down, park and unpark in order. Each emits an event. A command that is invalid
-// (hand not empty or not connected, instrument in use or out of reach, not a clamp, nothing held) emits instrument_refused.
+// Once per tick: processes take, swap, lay_down, park and unpark in order, and loads what is parked. Each emits an event. A
+// command that is invalid (hand not empty or not connected, instrument in use or out of reach, not a clamp, nothing held) emits
+// instrument_refused.
 void handle_instruments(const Model& model, State& state, const TickInput& input);
 // Without a hand it falls: it is back on its tray, open.
 void drop_instrument(const Model& model, State& state, size_t instrument);

@@ -15,6 +15,12 @@
 
 namespace catgut {
 
+// Elastic cord of an instrument while that is parked.
+struct Cord {
+  Vec3 pull;          // [N] in place of the weight, where it was parked; zero: no cord
+  float stretch = 0;  // [m] along the pull from there, at which the cord is slack and the weight is back; 0: never
+};
+
 // An instrument that is parked on tissue at the start of the scene.
 struct ParkedStart {
   size_t instrument = 0;
@@ -44,13 +50,13 @@ struct Model {
   uint32_t pieces = 0;
   float dt = 1.0f / 60;  // [s] tick
   int substeps = 8;
-  std::vector<Vec3> start;                       // [m] of every particle
-  std::vector<Pose> tray;                        // per instrument: its pose on the tray
-  std::vector<Vec3> pull;                        // [N] per parked instrument: replaces its weight; zero: its weight
-  std::vector<ParkedStart> parked;               // instruments that hold tissue at the start
-  std::array<Pose, kMaxHands> hand_start;        // before a hand connects
-  std::array<int, kMaxHands> hand_instrument{};  // held by each hand at the start; -1: none
-  std::vector<Pose> needle_start;                // body frame, per suture
+  std::vector<Vec3> start;                                               // [m] of every particle
+  std::vector<Pose> tray;                                                // per instrument: its pose on the tray
+  std::vector<Cord> cord;                                                // per instrument
+  std::vector<ParkedStart> parked;                                       // instruments that hold tissue at the start
+  std::array<Pose, kMaxHands> hand_start;                                // before a hand connects
+  std::array<int, kMaxHands> hand_instrument{};                          // held by each hand at the start; -1: none
+  std::vector<Pose> needle_start;                                        // body frame, per suture
   float hand_compliance = 1.0f / 3000, hand_angular_compliance = 0.05f;  // [m/N], [rad/(N m)] coupling of tool and hand
   PictureModel picture;
   std::shared_ptr<const PhysicalModel> physical;  // null: guided mechanics

@@ -47,6 +47,7 @@ struct InstrumentSpec {
   std::string where = "tray";    // right, left, assistant_right, assistant_left: in that hand; tray; parked: closed on tissue
   Vec3 at;                       // [m] parked: the jaws close on the tissue surface nearest to this point
   Vec3 pull;                     // [N] parked: this force replaces its weight; zero: its weight
+  float stretch = 0;  // [m] of the elastic cord that pulls: gone so far along the pull, it is slack; 0: constant pull
 };
 
 struct ThreadSpec {

@@ -28,7 +28,8 @@ class Excising final : public Surgeon {
   std::string doing() const override;
 
  private:
-  static constexpr size_t kBearings = 96;  // 1 mm apart, on a bowel of 30 mm
+  static constexpr size_t kBearings = 96;    // 1 mm apart, on a bowel of 30 mm
+  static constexpr float kSliver = 0.2e-3f;  // [kg] that a piece weighs at most that is not the specimen
   enum Stage {
     over_rim,
     down,
@@ -60,7 +61,7 @@ class Excising final : public Surgeon {
   Pose grasp_at(float raised) const;         // the hand that holds the specimen, raised along the axis [m]
   // [rad] the first angle at which the wall is still closed; 0, where the line began, if it is open all round.
   float closed_at(const Snapshot& seen) const;
-  bool freed(const Snapshot& seen) const { return seen.topology.pieces > picture_.body.size(); }
+  static bool freed(const Snapshot& seen) { return seen.wound.freed_mass > kSliver; }
   // [m] by which the pen leaves the planned line: it strays slowly in the first round, and follows its groove afterwards.
   float stray();
   void switch_pen() { commands_.push({CommandKind::cut, 0, 0}); }

@@ -25,7 +25,7 @@ constexpr void reflect(auto& a, Like<InstrumentState> auto& i) {
   if (i.held == Held::thread) a.index(i.slot, IndexOf::slot);
   else if (i.held == Held::tissue) a.index(i.slot, IndexOf::tissue);
   else a(i.slot);
-  a(i.at), a(i.jaw), a.at_most(i.place, InstrumentPlace::parked), a(i.hand), a(i.latched);
+  a(i.at), a(i.jaw), a.at_most(i.place, InstrumentPlace::parked), a(i.hand), a(i.latched), a(i.parked_at);
   a.index(i.suture, IndexOf::strand);
 }
 

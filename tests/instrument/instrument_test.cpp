@@ -251,6 +251,46 @@ TEST(Instrument, a_parked_clamp_pulls_with_the_stated_force) {
   EXPECT_NEAR(moved[1] / moved[0], 2, 0.4);
 }
 
+// At equilibrium the tissue carries what the cord has left.
+TEST(Instrument, a_cord_slackens_as_its_clamp_goes_with_it) {
+  Field f(
+      scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\n"
+                 "pull = [0.4, 0.0, 0.0]\nstretch = 0.002\n"));
+  const float from = f.seen.instrument[0].pose.p.x;
+  f.run(240);
+  const InstrumentView& v = f.seen.instrument[0];
+  const float left = 1 - (v.pose.p.x - from) / 0.002f;
+  EXPECT_EQ(v.held, Held::tissue);
+  EXPECT_LT(left, 0.8f);
+  EXPECT_GT(left, 0.4f);
+  EXPECT_NEAR(v.pull.x, 0.4f * left, 0.02f * 0.4f);
+}
+
+// A piece of bowel that nothing else holds does not fly away with its clamps, as it would with a constant pull.
+TEST(Instrument, cords_lift_a_free_piece_no_farther_than_they_were_stretched) {
+  for (const float stretch : {0.0f, 0.02f}) {
+    std::string clamps = "[mechanics]\nkind = \"physical\"\n";
+    for (const char* at : {"0.02", "-0.02"})
+      clamps += "[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [" + std::string(at) +
+                ", 0.0, 0.0]\npull = [0.0, 0.5, 0.0]\nstretch = " + std::to_string(stretch) + "\n";
+    SceneSpec scene = scene_with(clamps);
+    scene.body[0].pinned_length = 0;
+    Field f(scene);
+    const float from = f.seen.instrument[0].pose.p.y;
+    f.run(60);
+    const float after_a_second = f.seen.instrument[0].pose.p.y - from;
+    f.run(60);
+    const float after_two = f.seen.instrument[0].pose.p.y - from;
+    if (stretch == 0) {
+      EXPECT_GT(after_two, 0.2f);
+      continue;
+    }
+    EXPECT_NEAR(after_two, after_a_second, 1e-4f);
+    EXPECT_GT(after_two, 0.1f * stretch);
+    EXPECT_LT(after_two, stretch);
+  }
+}
+
 // Without a stated force: its weight, downward, unless the clamp lies on the drape.
 TEST(Instrument, a_parked_clamp_pulls_with_its_weight) {
   Field f(scene_with("[[instrument]]\nkind = \"allis\"\nwhere = \"parked\"\nat = [0.02, 0.0, 0.0]\n"));
