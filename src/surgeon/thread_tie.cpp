@@ -436,8 +436,13 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       if (!taut) drawn_ = std::min(far, drawn_ + speed * dt);
       tip_ = lerp(tip_from_, tip_to_, drawn_ / far);
       if (throws_ > 1) tip_ = give(tip_, tail_felt_, tail_given_, dt);
-      // The winding hand pulls the turn off the jaws, which have gone on.
-      slid_ = std::min(1.0f, slid_ + dt / kSlideOff);
+      // The winding hand pulls the turn off the jaws, which have gone on; it waits where the turn catches on them.
+      caught_ = felt_ > kCaught ? caught_ + dt : 0;
+      if (caught_ > kCaughtFor || waited_ > 5 * kPatience) {
+        again(seen, drop_tail);
+        break;
+      }
+      if (felt_ < kTaut) slid_ = std::min(1.0f, slid_ + dt / kSlideOff);
       const float turn = sense_ * 0.5f * kPi;
       const Vec3 middle = tip_from_ + shaft * kWindAt, past = middle - shaft * 26e-3f + Vec3{0, 8e-3f, 0};
       if (felt_ > 0.1f) radius_ = std::max(kNearest, radius_ - 0.06f * dt);
