@@ -271,7 +271,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
             continue;
           const Foot foot = outer_foot(wm, ws, surface, q, p, corners_in(search, q));
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
-          add(i, foot, p, s.radius, jaw_speed, 1, inside, s.jaw);
+          add(i, foot, p, s.radius, jaw_speed, kSphereRow, inside, s.jaw);
         }
       }
     }
@@ -316,7 +316,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
                             : rotate(body.pose.q,
                                      lerp(local(m, sa, moving.opening) - la, local(m, sb, moving.opening) - lb, t) * (1 / h));
             foot.patch = 2 * q + (zeta > 0 ? 1 : 0);
-            add(i, foot, on, radius, jaw_speed, 2, inside, sa.jaw);
+            add(i, foot, on, radius, jaw_speed, kAxisRow, inside, sa.jaw);
           }
         }
       }

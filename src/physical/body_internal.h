@@ -43,10 +43,14 @@ inline void nearest_of_segments(Vec3 a, Vec3 b, Vec3 c, Vec3 d, float& s, float&
   s = uu > 0 ? std::clamp((uv * t - dot(u, r)) / uu, 0.0f, 1.0f) : 0.0f;
 }
 
-constexpr uint64_t kThreadGripRow = 6, kDrapeRow = 7;  // kinds of key: jaws on a thread, a needle on the drape
+// Kinds of key: a body's sphere and its axis on the wall, jaws on a thread, a needle on the drape.
+constexpr uint64_t kSphereRow = 1, kAxisRow = 2, kThreadGripRow = 6, kDrapeRow = 7;
 constexpr uint64_t key_of(uint64_t kind, uint64_t body, uint64_t part, uint64_t patch) {
   return kind << 60 | body << 52 | part << 36 | patch;
 }
+constexpr uint64_t kind_of(uint64_t key) { return key >> 60; }
+constexpr uint32_t part_of(uint64_t key) { return static_cast<uint32_t>(key >> 36 & 0xffff); }
+constexpr uint32_t patch_of(uint64_t key) { return static_cast<uint32_t>(key); }
 
 inline const RowMemory* remembered(const Bodies& bodies, uint64_t key) {
   const auto at = std::lower_bound(bodies.memory.begin(), bodies.memory.end(), key,

@@ -7,6 +7,7 @@
 #include "core/archive.h"
 #include "core/hash.h"
 #include "physical/lacing.h"
+#include "physical/landing.h"
 #include "physical/reflect.h"
 
 namespace catgut::physical {
@@ -496,7 +497,11 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
   }
   if (bodies) solve_bodies(m.bodies, m.wall, s.wall, k.wall, s.bodies, hands.targets, k.bodies);
   wall::finish_step(m.wall, s.wall, jobs);
-  if (bodies) end_bodies(m, s, k);
+  if (bodies) {
+    put_tools_out(m, s, k);
+    end_bodies(m, s, k);
+  }
+  put_thread_out(m, s, k);
   // Lips and bodies have moved the wall after the thread saw it move. To a node on it, that is drift: its friction returns it.
   size_t at = 0;
   for (const thread::SoftContact& c : k.contact) {

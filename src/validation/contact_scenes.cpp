@@ -136,6 +136,7 @@ float overlap_of(const Rod& p, const Rod& q) {
   nearest_fractions(p.a, p.b, q.a, q.b, s, t);
   return p.ra + (p.rb - p.ra) * s + q.ra + (q.rb - q.ra) * t - distance(lerp(p.a, p.b, s), lerp(q.a, q.b, t));
 }
+constexpr float kNear = 4e-3f;     // [m] more than half of any wall, and than the thickest instrument
 constexpr float kThrough = 0.75f;  // of the thinner one's thickness and the other's radius: its axis is through the other's
 
 std::vector<Rod> rods_of(const BodyModel& m, const physical::Body& body) {
@@ -148,16 +149,16 @@ std::vector<Rod> rods_of(const BodyModel& m, const physical::Body& body) {
   return rods;
 }
 
-// The segment p q crosses the triangle a b c.
-bool crosses(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c) {
+// Where the segment p q crosses the triangle a b c, as a fraction of it; -1: it does not.
+float crosses(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c) {
   const Vec3 d = q - p, e = b - a, f = c - a, h = cross(d, f);
   const float det = dot(e, h);
-  if (std::abs(det) < 1e-16f) return false;
+  if (std::abs(det) < 1e-16f) return -1;
   const Vec3 r = p - a;
   const float u = dot(r, h) / det;
   const Vec3 g = cross(r, e);
   const float v = dot(d, g) / det, t = dot(f, g) / det;
-  return u >= 0 && v >= 0 && u + v <= 1 && t >= 0 && t <= 1;
+  return u >= 0 && v >= 0 && u + v <= 1 && t >= 0 && t <= 1 ? t : -1;
 }
 
 struct Face {
@@ -174,8 +175,9 @@ Face face_of(const wall::Model& wm, const wall::State& ws, uint32_t f) {
   return face;
 }
 
-// A quadrilateral is a bilinear patch: where it is warped, two triangles are up to a quarter of the warp beside it.
-bool crosses_face(Vec3 p, Vec3 q, const Face& face) {
+// The same of a face. A quadrilateral is a bilinear patch: where it is warped, two triangles are up to a quarter of the warp
+// beside it.
+float crosses_face(Vec3 p, Vec3 q, const Face& face) {
   const auto& c = face.corner;
   if (face.count == 3) return crosses(p, q, c[0], c[1], c[2]);
   constexpr float kFlat = 0.1e-3f;  // [m]
@@ -186,9 +188,12 @@ bool crosses_face(Vec3 p, Vec3 q, const Face& face) {
   };
   for (int i = 0; i < parts; ++i)
     for (int j = 0; j < parts; ++j)
-      if (crosses(p, q, at(i, j), at(i + 1, j), at(i + 1, j + 1)) || crosses(p, q, at(i, j), at(i + 1, j + 1), at(i, j + 1)))
-        return true;
-  return false;
+      for (const bool upper : {false, true})
+        if (const float t =
+                crosses(p, q, at(i, j), upper ? at(i + 1, j + 1) : at(i + 1, j), upper ? at(i, j + 1) : at(i + 1, j + 1));
+            t >= 0)
+          return t;
+  return -1;
 }
 
 Vec3 place_at(const wall::Model& wm, const wall::State& ws, wall::Point p, float zeta) {
@@ -225,6 +230,7 @@ ContactBench::ContactBench(uint64_t s, ContactBody body) : seed(s) {
   }
   middle = (low + high) * 0.5f;
   bound(rest.wall, at_rest);
+  skin = std::make_unique<Skin>(model, rest.wall);
   // Across the body, its ends drawn down beside it.
   std::vector<Vec3> path;
   const float top = high.y + 0.5f * w.model.laminate.thickness + 0.5e-3f;
@@ -260,7 +266,6 @@ void ContactBench::step() {
 void ContactBench::forget() {
   std::fill(std::begin(passed), std::end(passed), 0);
   std::fill(std::begin(deepest), std::end(deepest), 0.0f);
-  folded = 0;
 }
 
 void ContactBench::bound(const wall::State& ws, Bounds& bounds) const {
@@ -280,42 +285,41 @@ bool ContactBench::passes_wall(const wall::State& ws, const Bounds& bounds, Vec3
   const float half = 0.5f * distance(p, q);
   for (uint32_t f = 0; f < bounds.center.size(); ++f) {
     if (length2(bounds.center[f] - between) > (bounds.radius[f] + half) * (bounds.radius[f] + half)) continue;
-    const Face face = face_of(model.wall, ws, f);
-    if (crosses_face(p, q, face)) return true;
+    const float t = crosses_face(p, q, face_of(model.wall, ws, f));
+    // The middle of the wall ends at its rim: a thread that lies in that as deep as it may is not through it. The middle of a
+    // face that is folded upon itself may lie outside its skin.
+    const Vec3 at = lerp(p, q, t);
+    if (t >= 0 && skin_distance(ws, bounds, at) > kMostOverlap - 0.5f * model.thread.material.diameter && skin->inside(at))
+      return true;
   }
   return false;
 }
 
-float ContactBench::wall_overlap(const wall::State& ws, const Bounds& bounds, Vec3 p, float r) {
-  const wall::Model& wm = model.wall;
-  Foot best;
-  float far = 1;
+void ContactBench::see_wall() {
+  bound(state.wall, now);
+  skin->follow(model, state.wall);
+}
+
+float ContactBench::skin_distance(const wall::State& ws, const Bounds& bounds, Vec3 p) const {
+  float far = kNear;
   for (uint32_t f = 0; f < bounds.center.size(); ++f) {
-    const float reach = bounds.radius[f] + 4e-3f;
+    const float reach = bounds.radius[f] + kNear;
     if (length2(bounds.center[f] - p) > reach * reach) continue;
-    for (uint32_t q = model.surface.first_of_face[f]; q < model.surface.first_of_face[f + 1]; ++q) {
-      const Foot foot = outer_foot(wm, ws, model.surface, q, p);
-      const float d = distance(foot.at, p);
-      const bool clearer = d < far + 1e-7f && dot(p - foot.at, foot.facing) > dot(p - best.at, best.facing);
-      if (d < far - 1e-7f || clearer) best = foot, far = std::min(far, d);
-    }
+    for (uint32_t q = model.surface.first_of_face[f]; q < model.surface.first_of_face[f + 1]; ++q)
+      far = std::min(far, distance(nearest_on_patch(model.wall, ws, model.surface, q, p).at, p));
   }
-  // Outside, beyond an edge, where no facing decides.
-  if (far > 0.9f || (best.on_edge && best.gap < 0)) return 0;
-  // Within the wall no place is as far from all faces: this one is behind a fold, and outside.
-  if (best.gap < 0 && far > 0.75f * wm.laminate.thickness) return 0;
-  // A face folded or sheared so far that its directors lie in it has no inside.
-  const float height = std::abs(dot(place_at(wm, ws, best.point, 1) - place_at(wm, ws, best.point, 0), best.facing));
-  if (model.surface.patch[best.patch].side != 0 && height < 0.05f * wm.laminate.thickness) {
-    folded += far < r + 1e-4f;
-    return 0;
-  }
-  return r - best.gap;
+  return far;
+}
+
+float ContactBench::wall_overlap(const wall::State& ws, const Bounds& bounds, Vec3 p, float r) const {
+  const float far = skin_distance(ws, bounds, p);
+  if (far >= kNear) return 0;
+  return skin->inside(p) ? r + far : r - far;
 }
 
 void ContactBench::look() {
   const wall::State& ws = state.wall;
-  bound(ws, now);
+  see_wall();
   const auto deepen = [&](ContactPair pair, float overlap) { deepest[pair] = std::max(deepest[pair], overlap); };
   std::vector<Rod> rods[2];
   for (uint32_t b = 0; b < 2; ++b) {
@@ -377,7 +381,7 @@ void ContactBench::event(float max_force, float max_speed) {
   BodyModel& tool = model.bodies.body[0];
   tool.max_force = max_force * (0.25f + 0.75f * random.uniform());
   const float opening = random.uniform() < 0.5f ? 0.0f : 0.2f * random.uniform();
-  bound(state.wall, now);
+  see_wall();
   // The needle falls on the body, or is thrown at it.
   if (events % 5 == 1 || random.uniform() < 0.3f) {
     const Vec3 d = direction();
@@ -392,7 +396,7 @@ void ContactBench::event(float max_force, float max_speed) {
   for (int tries = 1;; ++tries) {
     if (tries % 400 == 0) {  // what an earlier event has left is in the way everywhere
       state = rest;
-      bound(state.wall, now);
+      see_wall();
     }
     const bool within = random.uniform() < 0.25f;
     const uint32_t face = free[static_cast<size_t>(random.uniform() * static_cast<float>(free.size())) % free.size()];

@@ -9,6 +9,7 @@
 #include "core/random.h"
 #include "physical/physical.h"
 #include "validation/knot_scenes.h"
+#include "validation/skin.h"
 
 namespace catgut::validation {
 
@@ -22,10 +23,13 @@ const char* name_of(ContactBody body);
 enum ContactPair : uint8_t { tool_wall, needle_wall, thread_wall, tool_needle, tool_thread, needle_thread, kContactPairs };
 const char* name_of(ContactPair pair);
 
+constexpr float kMostOverlap = 0.3e-3f;  // [m]
+
 struct ContactBench {
   physical::Model model;
   physical::State state, rest;
   std::unique_ptr<physical::Scratch> scratch;
+  std::unique_ptr<Skin> skin;  // of the wall when it was looked at
   Jobs jobs{1};
   std::vector<physical::HandTarget> target;  // tool, needle
   std::vector<thread::Pull> pull;
@@ -37,7 +41,6 @@ struct ContactBench {
   // Of the last event: overlap [m]; how often one was seen through the other.
   float deepest[kContactPairs] = {};
   int passed[kContactPairs] = {};
-  int folded = 0;                    // spheres on faces that are folded upon themselves
   float fastest = 0, strongest = 0;  // [m/s] of a body, [N] on a body, over all events
   float tightest = 0;                // [N] of the thread
   explicit ContactBench(uint64_t s, ContactBody body = ContactBody::tube);
@@ -56,7 +59,10 @@ struct ContactBench {
   Vec3 direction();
   void bound(const wall::State& ws, Bounds& bounds) const;
   bool passes_wall(const wall::State& ws, const Bounds& bounds, Vec3 p, Vec3 q) const;
-  float wall_overlap(const wall::State& ws, const Bounds& bounds, Vec3 p, float r);
+  // [m] by which a ball lies in the wall, whose skin follows it; beyond its whole diameter where the center is inside.
+  float wall_overlap(const wall::State& ws, const Bounds& bounds, Vec3 p, float r) const;
+  float skin_distance(const wall::State& ws, const Bounds& bounds, Vec3 p) const;  // [m] 4 mm at most
+  void see_wall();
   // The tool at this pose touches neither wall, needle nor thread, as they are and as they were at rest.
   bool clear(const Pose& tool, float opening);
   void forget();

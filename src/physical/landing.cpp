@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// physical/landing: see the header.
+#include "physical/landing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "physical/body_internal.h"
+
+namespace catgut::physical {
+namespace {
+
+constexpr int kRounds = 4;  // over contacts that share a node, or a tool
+
+// Puts nodes elsewhere. The pairs of the thread are looked at again when nodes have moved.
+struct Mover {
+  thread::State& t;
+  float moved = 0;  // [m] all together: no node has moved farther
+  void move(uint32_t node, Vec3 by) {
+    t.x.set(node, t.x.at(node) + by);
+    moved += length(by);
+  }
+  ~Mover() {
+    if (moved == 0) return;
+    t.travel += moved;
+    for (float& left : t.budget) left -= 2 * moved;
+  }
+};
+
+// Thread that a loose needle has hit otherwise than it was shown to (show_bodies).
+bool put_off_needle(const Model& m, State& s, const Scratch& k, size_t pair, Mover& mover) {
+  const uint32_t part = thread::partner_of(s.thread.key[pair]) - thread::kTool, b = k.bodies.tool_body[part];
+  const BodyModel& needle = m.bodies.body[b];
+  const thread::Crossing& c = s.thread.crossing[pair];
+  if (!needle.falls || !k.bodies.moving[b].loose || c.touch == thread::Touch::unknown) return false;
+  const auto first = std::find(k.bodies.tool_body.begin(), k.bodies.tool_body.end(), b) - k.bodies.tool_body.begin();
+  const BodyCapsule& capsule = needle.thread_capsule[part - static_cast<size_t>(first)];
+  const BodySphere &sa = needle.sphere[capsule.a], &sb = needle.sphere[capsule.b];
+  const Pose& pose = s.bodies.body[b].pose;
+  const Vec3 a = transform(pose, sa.at), z = transform(pose, sb.at);
+  const float ra = std::abs(sa.radius), rb = std::abs(sb.radius), r = 0.5f * m.thread.material.diameter;
+  const uint32_t node = thread::segment_of(s.thread.key[pair]);
+  const Vec3 p = s.thread.position(node), q = s.thread.position(node + 1);
+  const float reach = 0.5f * (distance(p, q) + distance(a, z)) + r + std::max(ra, rb);
+  if (length2(p + q - a - z) > 4 * reach * reach) return false;
+  float along = 0, at = 0;
+  nearest_of_segments(p, q, a, z, along, at);
+  // A crossing knows on which side of each other they belong.
+  Vec3 apart = lerp(p, q, along) - lerp(a, z, at), normal = normalized(apart, c.normal);
+  if (dot(normal, c.normal) < -0.3f) normal = -normal;
+  const float out = r + ra + (rb - ra) * at - dot(apart, normal) - kThreadLands;
+  if (out <= 0) return false;
+  for (const uint32_t n : {node, node + 1}) mover.move(n, normal * std::min(out, kFarthestOut));
+  return true;
+}
+
+// The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
+Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uint32_t body, Vec3 p, float reach) {
+  const Surface& surface = surface_of(m, s);
+  constexpr float kMoved = 2e-3f;  // [m] by a face, at most, since its center was noted
+  Foot best;
+  best.patch = wall::kNone;
+  float far = reach;
+  for (const uint32_t f : k.around[body].face) {
+    const float ball = k.face_radius[f] + reach + kMoved;
+    if (length2(k.face_center[f] - p) > ball * ball) continue;
+    for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
+      const Foot foot = outer_foot(m.wall, s.wall, surface, q, p);
+      const float d = distance(foot.at, p);
+      // At an edge, of the patch that the sphere is in front of.
+      const bool same = best.patch != wall::kNone && d < far + 1e-7f;
+      if (d < far - 1e-7f || (same && dot(p - foot.at, foot.facing) > dot(p - best.at, best.facing)))
+        best = foot, far = std::min(far, d);
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+void put_tools_out(const Model& m, State& s, const Scratch& k) {
+  for (uint32_t b = 0; b < s.bodies.body.size(); ++b) {
+    const BodyModel& tool = m.bodies.body[b];
+    Body& body = s.bodies.body[b];
+    if (tool.falls || !k.bodies.around[b].made) continue;
+    bool moved = true;
+    for (int round = 0; round < kRounds && std::exchange(moved, false); ++round)
+      for (uint32_t i = 0; i < tool.sphere.size(); ++i) {
+        const BodySphere& sphere = tool.sphere[i];
+        if (sphere.radius <= kToolLands || (i < 64 && body.skip >> i & 1)) continue;
+        const Vec3 at = transform(body.pose, local(tool, sphere, body.opening));
+        const Foot foot = nearest_of_near(m, s, k.bodies, b, at, sphere.radius - kToolLands);
+        if (foot.patch == wall::kNone || foot.gap <= 0) continue;
+        body.pose.p += foot.normal * std::min(sphere.radius - kToolLands - foot.gap, kFarthestOut);
+        moved = true;
+      }
+  }
+}
+
+void put_thread_out(const Model& m, State& s, const Scratch& k) {
+  Mover mover{s.thread};
+  const bool asleep = s.sleep.any();
+  bool moved = true;
+  for (int round = 0; round < kRounds && std::exchange(moved, false); ++round)
+    for (size_t i = 0; i < s.thread.key.size(); ++i)
+      if (thread::partner_of(s.thread.key[i]) >= thread::kTool && !(asleep && s.sleep.at(thread::segment_of(s.thread.key[i]))))
+        moved |= put_off_needle(m, s, k, i, mover);
+  // The wall that has come farther toward a node than the thread's step foresaw.
+  for (const thread::SoftContact& c : k.contact) {
+    const float nearer = dot(k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]), c.normal);
+    const float out = std::min(nearer, nearer - c.gap - kThreadLands);
+    if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
+  }
+}
+
+}  // namespace catgut::physical
