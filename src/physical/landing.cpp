@@ -28,18 +28,21 @@ struct Mover {
   }
 };
 
-// Thread that a loose needle has hit otherwise than it was shown to (show_bodies).
-bool put_off_needle(const Model& m, State& s, const Scratch& k, size_t pair, Mover& mover) {
+// Thread that a loose needle, or a tool that holds nothing, has hit otherwise than it was shown to (show_bodies). Where the
+// tool yields to thread, as between shutting jaws, they may overlap. no mover: the tool goes, not the thread.
+bool put_apart(const Model& m, State& s, const Scratch& k, size_t pair, Mover* mover) {
   const uint32_t part = thread::partner_of(s.thread.key[pair]) - thread::kTool, b = k.bodies.tool_body[part];
-  const BodyModel& needle = m.bodies.body[b];
+  const BodyModel& model = m.bodies.body[b];
+  Body& body = s.bodies.body[b];
   const thread::Crossing& c = s.thread.crossing[pair];
-  if (!needle.falls || !k.bodies.moving[b].loose || c.touch == thread::Touch::unknown) return false;
+  const thread::ToolCapsule& tool = k.bodies.tool[part];
+  const bool yields = body.grip.what != Gripped::nothing || tool.press < thread::ToolCapsule{}.press;
+  if ((model.falls ? !k.bodies.moving[b].loose : yields) || c.touch == thread::Touch::unknown) return false;
   const auto first = std::find(k.bodies.tool_body.begin(), k.bodies.tool_body.end(), b) - k.bodies.tool_body.begin();
-  const BodyCapsule& capsule = needle.thread_capsule[part - static_cast<size_t>(first)];
-  const BodySphere &sa = needle.sphere[capsule.a], &sb = needle.sphere[capsule.b];
-  const Pose& pose = s.bodies.body[b].pose;
-  const Vec3 a = transform(pose, sa.at), z = transform(pose, sb.at);
-  const float ra = std::abs(sa.radius), rb = std::abs(sb.radius), r = 0.5f * m.thread.material.diameter;
+  const BodyCapsule& capsule = model.thread_capsule[part - static_cast<size_t>(first)];
+  const Vec3 a = transform(body.pose, local(model, model.sphere[capsule.a], body.opening)),
+             z = transform(body.pose, local(model, model.sphere[capsule.b], body.opening));
+  const float ra = tool.radius, rb = ra + tool.widens, r = 0.5f * m.thread.material.diameter;
   const uint32_t node = thread::segment_of(s.thread.key[pair]);
   const Vec3 p = s.thread.position(node), q = s.thread.position(node + 1);
   const float reach = 0.5f * (distance(p, q) + distance(a, z)) + r + std::max(ra, rb);
@@ -49,10 +52,35 @@ bool put_off_needle(const Model& m, State& s, const Scratch& k, size_t pair, Mov
   // A crossing knows on which side of each other they belong.
   Vec3 apart = lerp(p, q, along) - lerp(a, z, at), normal = normalized(apart, c.normal);
   if (dot(normal, c.normal) < -0.3f) normal = -normal;
-  const float out = r + ra + (rb - ra) * at - dot(apart, normal) - kThreadLands;
+  const float out = r + ra + (rb - ra) * at - dot(apart, normal) - kOnBodyLands;
   if (out <= 0) return false;
-  for (const uint32_t n : {node, node + 1}) mover.move(n, normal * std::min(out, kFarthestOut));
+  const Vec3 by = normal * std::min(out, kFarthestOut);
+  const auto presses = [&](const Row& row) {
+    return (row.a == b || row.b == b) && row.kind == Row::Kind::contact && kind_of(row.key) != kDrapeRow &&
+           dot(row.impulse, row.axis) > 0;
+  };
+  // A needle that has way goes, too: it is as light as the thread, which that would stretch.
+  const bool has_way = model.falls && std::none_of(k.bodies.row.begin(), k.bodies.row.end(), presses);
+  if (has_way || (!mover && !model.falls)) body.pose.p -= by;
+  else if (mover) mover->move(node, by), mover->move(node + 1, by);
   return true;
+}
+
+// A node beside which the wall has landed so far that another face may be the nearest one.
+constexpr float kOtherPlace = 0.15e-3f;  // [m]
+void put_off_wall(const Model& m, State& s, const Scratch& k, const thread::SoftContact& c, Mover& mover) {
+  const Surface& surface = surface_of(m, s);
+  const float r = 0.5f * m.thread.material.diameter;
+  const Vec3 p = s.thread.position(c.node);
+  Foot best;
+  float far = 1e-3f;
+  for (uint32_t f = k.search.node_first[c.node]; f < k.search.node_first[c.node + 1]; ++f)
+    for (uint32_t q = surface.first_of_face[k.search.node_face[f]]; q < surface.first_of_face[k.search.node_face[f] + 1]; ++q) {
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
+      if (const float d = distance(foot.at, p); d < far && dot(foot.facing, c.normal) > -0.2f) best = foot, far = d;
+    }
+  const float out = r - best.gap - kThreadLands;
+  if (far < 1e-3f && out > 0) mover.move(c.node, best.normal * std::min(out, kFarthestOut));
 }
 
 // The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
@@ -101,17 +129,24 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
 void put_thread_out(const Model& m, State& s, const Scratch& k) {
   Mover mover{s.thread};
   const bool asleep = s.sleep.any();
-  bool moved = true;
-  for (int round = 0; round < kRounds && std::exchange(moved, false); ++round)
+  const auto put_all_apart = [&](Mover* by) {
+    bool moved = false;
     for (size_t i = 0; i < s.thread.key.size(); ++i)
       if (thread::partner_of(s.thread.key[i]) >= thread::kTool && !(asleep && s.sleep.at(thread::segment_of(s.thread.key[i]))))
-        moved |= put_off_needle(m, s, k, i, mover);
+        moved |= put_apart(m, s, k, i, by);
+    return moved;
+  };
+  for (int round = 0; round < kRounds; ++round)
+    if (!put_all_apart(&mover)) break;
   // The wall that has come farther toward a node than the thread's step foresaw.
   for (const thread::SoftContact& c : k.contact) {
-    const float nearer = dot(k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]), c.normal);
-    const float out = std::min(nearer, nearer - c.gap - kThreadLands);
+    const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]);
+    const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
     if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
+    if (length2(beside) > kOtherPlace * kOtherPlace) put_off_wall(m, s, k, c, mover);
   }
+  // Thread between a tool and the wall: the tool goes.
+  if (mover.moved > 0) put_all_apart(nullptr);
 }
 
 }  // namespace catgut::physical

@@ -8,9 +8,9 @@
 namespace catgut::validation {
 namespace {
 
-constexpr float kFar = 3;  // radii of a piece, beyond which it counts as a point with an area: within 2 % of its solid angle
-constexpr float kFlat = 0.05e-3f;  // [m] of warp
-constexpr int kParts = 8;
+// Radii of a piece, beyond which it counts as a point with an area (within 2 % of its solid angle), and as two triangles.
+constexpr float kFar = 3, kBeside = 1.5f;
+constexpr float kFlat = 0.02e-3f;  // [m] by which triangles may lie beside a warped piece, for what is near it
 
 // [sr] of a triangle, seen from the origin (Van Oosterom and Strackee 1983, 10.1109/TBME.1983.325207).
 float solid_angle(Vec3 a, Vec3 b, Vec3 c) {
@@ -51,6 +51,7 @@ void Skin::follow(const physical::Model& model, const wall::State& state) {
     piece.area = 0.5f * cross(c[1] - c[0], c[2] - c[0]);
     if (piece.count == 4) piece.area += 0.5f * cross(c[2] - c[0], c[3] - c[0]);
     if (piece.turned) piece.area = -piece.area;
+    piece.warp = piece.count == 4 ? length(c[0] - c[1] + c[2] - c[3]) : 0.0f;
     piece.radius = 0;
     for (size_t k = 0; k < piece.count; ++k) piece.radius = std::max(piece.radius, distance(piece.center, c[k]));
   }
@@ -67,7 +68,8 @@ float Skin::winding(Vec3 p) const {
     }
     const auto& c = piece.corner;
     // A warped quadrilateral is a bilinear patch: two triangles are up to a quarter of the warp beside it.
-    const int parts = piece.count == 4 && length2(c[0] - c[1] + c[2] - c[3]) > kFlat * kFlat ? kParts : 1;
+    const bool near = piece.count == 4 && far2 < kBeside * kBeside * piece.radius * piece.radius;
+    const int parts = near ? static_cast<int>(std::ceil(std::sqrt(0.25f * piece.warp / kFlat + 1e-6f))) : 1;
     const auto at = [&](int i, int j) {
       const float s = static_cast<float>(i) / static_cast<float>(parts), t = static_cast<float>(j) / static_cast<float>(parts);
       return lerp(lerp(c[0], c[1], s), lerp(c[3], c[2], s), t) - p;

@@ -27,6 +27,7 @@ class Skin {
     bool turned = false;  // its corners go round clockwise, seen from outside
     Vec3 center, area;    // [m], [m2] outward
     float radius = 0;     // [m] about the center
+    float warp = 0;       // [m] from a parallelogram
   };
   std::vector<Piece> piece_;
 };
