@@ -11,7 +11,8 @@
 namespace catgut::physical {
 namespace {
 
-constexpr int kRounds = 4;  // over contacts that share a node, or a tool
+constexpr int kRounds = 4;       // over contacts that share a node, or a tool
+constexpr float kStill = 1e-4f;  // [rad] of jaws from where they shall be
 
 // Puts nodes elsewhere. The pairs of the thread are looked at again when nodes have moved.
 struct Mover {
@@ -28,16 +29,17 @@ struct Mover {
   }
 };
 
-// Thread that a loose needle, or a tool that holds nothing, has hit otherwise than it was shown to (show_bodies). Where the
-// tool yields to thread, as between shutting jaws, they may overlap. no mover: the tool goes, not the thread.
-bool put_apart(const Model& m, State& s, const Scratch& k, size_t pair, Mover* mover) {
+// Thread that a loose needle, or a tool that holds nothing, has hit otherwise than it was shown to (show_bodies). Jaws that
+// move press thread between them. No mover: the tool goes, not the thread.
+bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, size_t pair, Mover* mover) {
   const uint32_t part = thread::partner_of(s.thread.key[pair]) - thread::kTool, b = k.bodies.tool_body[part];
   const BodyModel& model = m.bodies.body[b];
   Body& body = s.bodies.body[b];
   const thread::Crossing& c = s.thread.crossing[pair];
   const thread::ToolCapsule& tool = k.bodies.tool[part];
-  const bool yields = body.grip.what != Gripped::nothing || tool.press < thread::ToolCapsule{}.press;
-  if ((model.falls ? !k.bodies.moving[b].loose : yields) || c.touch == thread::Touch::unknown) return false;
+  const bool still = b >= hands.targets.size() || std::abs(hands.targets[b].opening - body.opening) < kStill;
+  const bool rigid = model.falls ? k.bodies.moving[b].loose : still && body.grip.what == Gripped::nothing;
+  if (!rigid || c.touch == thread::Touch::unknown) return false;
   const auto first = std::find(k.bodies.tool_body.begin(), k.bodies.tool_body.end(), b) - k.bodies.tool_body.begin();
   const BodyCapsule& capsule = model.thread_capsule[part - static_cast<size_t>(first)];
   const Vec3 a = transform(body.pose, local(model, model.sphere[capsule.a], body.opening)),
@@ -66,8 +68,9 @@ bool put_apart(const Model& m, State& s, const Scratch& k, size_t pair, Mover* m
   return true;
 }
 
-// A node beside which the wall has landed so far that another face may be the nearest one.
-constexpr float kOtherPlace = 0.15e-3f;  // [m]
+// A node for which another face may be the nearest one now: the wall has landed so far beside it, or it has slid farther still.
+constexpr float kOtherPlace = 0.15e-3f;  // [m] by the wall
+constexpr float kSlides = 0.4f;          // of that, for a node's own way, which the thread's step knows
 void put_off_wall(const Model& m, State& s, const Scratch& k, const thread::SoftContact& c, Mover& mover) {
   const Surface& surface = surface_of(m, s);
   const float r = 0.5f * m.thread.material.diameter;
@@ -126,14 +129,14 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
   }
 }
 
-void put_thread_out(const Model& m, State& s, const Scratch& k) {
+void put_thread_out(const Model& m, State& s, const Scratch& k, const Hands& hands) {
   Mover mover{s.thread};
   const bool asleep = s.sleep.any();
   const auto put_all_apart = [&](Mover* by) {
     bool moved = false;
     for (size_t i = 0; i < s.thread.key.size(); ++i)
       if (thread::partner_of(s.thread.key[i]) >= thread::kTool && !(asleep && s.sleep.at(thread::segment_of(s.thread.key[i]))))
-        moved |= put_apart(m, s, k, i, by);
+        moved |= put_apart(m, s, k, hands, i, by);
     return moved;
   };
   for (int round = 0; round < kRounds; ++round)
@@ -143,10 +146,12 @@ void put_thread_out(const Model& m, State& s, const Scratch& k) {
     const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]);
     const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
     if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
-    if (length2(beside) > kOtherPlace * kOtherPlace) put_off_wall(m, s, k, c, mover);
+    const Vec3 went = s.thread.v.at(c.node) * m.wall.step;
+    if (std::max(length2(beside), length2(went) * kSlides * kSlides) > kOtherPlace * kOtherPlace)
+      put_off_wall(m, s, k, c, mover);
   }
-  // Thread between a tool and the wall: the tool goes.
-  if (mover.moved > 0) put_all_apart(nullptr);
+  // Thread between a tool and the wall: the tool goes. It may have come into other thread by that.
+  if (mover.moved > 0 && put_all_apart(nullptr)) put_all_apart(&mover);
 }
 
 }  // namespace catgut::physical

@@ -15,6 +15,6 @@ constexpr float kFarthestOut = 0.5e-3f;  // [m] at once
 // Before what jaws hold is looked at.
 void put_tools_out(const Model& model, State& state, const Scratch& scratch);
 // Last of all.
-void put_thread_out(const Model& model, State& state, const Scratch& scratch);
+void put_thread_out(const Model& model, State& state, const Scratch& scratch, const Hands& hands);
 
 }  // namespace catgut::physical

@@ -501,7 +501,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     put_tools_out(m, s, k);
     end_bodies(m, s, k);
   }
-  put_thread_out(m, s, k);
+  put_thread_out(m, s, k, hands);
   // Lips and bodies have moved the wall after the thread saw it move. To a node on it, that is drift: its friction returns it.
   size_t at = 0;
   for (const thread::SoftContact& c : k.contact) {
