@@ -82,8 +82,9 @@ void put_off_wall(const Model& m, State& s, const Scratch& k, const thread::Soft
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
       if (const float d = distance(foot.at, p); d < far && dot(foot.facing, c.normal) > -0.2f) best = foot, far = d;
     }
+  // From within nothing says which way is out.
   const float out = r - best.gap - kThreadLands;
-  if (far < 1e-3f && out > 0) mover.move(c.node, best.normal * std::min(out, kFarthestOut));
+  if (far < 1e-3f && out > 0 && best.gap > 0) mover.move(c.node, best.normal * std::min(out, kFarthestOut));
 }
 
 // The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
