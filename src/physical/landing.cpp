@@ -11,7 +11,7 @@
 namespace catgut::physical {
 namespace {
 
-constexpr int kRounds = 4;       // over contacts that share a node, or a tool
+constexpr int kRounds = 5;       // over contacts that share a node, or a tool
 constexpr float kStill = 1e-4f;  // [rad] of jaws from where they shall be
 
 // Puts nodes elsewhere. The pairs of the thread are looked at again when nodes have moved.
@@ -30,7 +30,7 @@ struct Mover {
 };
 
 // Thread that a loose needle, or a tool that holds nothing, has hit otherwise than it was shown to (show_bodies). Jaws that
-// move press thread between them. No mover: the tool goes, not the thread.
+// move press thread, and so do jaws on their inner side. No mover: the tool goes, not the thread.
 bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, size_t pair, Mover* mover) {
   const uint32_t part = thread::partner_of(s.thread.key[pair]) - thread::kTool, b = k.bodies.tool_body[part];
   const BodyModel& model = m.bodies.body[b];
@@ -54,6 +54,8 @@ bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, s
   // A crossing knows on which side of each other they belong.
   Vec3 apart = lerp(p, q, along) - lerp(a, z, at), normal = normalized(apart, c.normal);
   if (dot(normal, c.normal) < -0.3f) normal = -normal;
+  const float jaw = model.sphere[capsule.a].jaw;
+  if (jaw != 0 && dot(normal, rotate(body.pose.q, {-jaw, 0, 0})) > 0.3f) return false;
   const float out = r + ra + (rb - ra) * at - dot(apart, normal) - kOnBodyLands;
   if (out <= 0) return false;
   const Vec3 by = normal * std::min(out, kFarthestOut);
@@ -82,9 +84,9 @@ void put_off_wall(const Model& m, State& s, const Scratch& k, const thread::Soft
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
       if (const float d = distance(foot.at, p); d < far && dot(foot.facing, c.normal) > -0.2f) best = foot, far = d;
     }
-  // From within nothing says which way is out.
+  // From deep within nothing says which way is out.
   const float out = r - best.gap - kThreadLands;
-  if (far < 1e-3f && out > 0 && best.gap > 0) mover.move(c.node, best.normal * std::min(out, kFarthestOut));
+  if (far < 1e-3f && out > 0 && best.gap > -r) mover.move(c.node, best.normal * std::min(out, kFarthestOut));
 }
 
 // The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
@@ -124,7 +126,8 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
         const Vec3 at = transform(body.pose, local(tool, sphere, body.opening));
         const Foot foot = nearest_of_near(m, s, k.bodies, b, at, sphere.radius - kToolLands);
         if (foot.patch == wall::kNone || foot.gap <= 0) continue;
-        body.pose.p += foot.normal * std::min(sphere.radius - kToolLands - foot.gap, kFarthestOut);
+        // Half of it in each round: between two walls, and with a wall between its jaws, it comes to lie in the middle.
+        body.pose.p += foot.normal * std::min(0.5f * (sphere.radius - kToolLands - foot.gap), kFarthestOut);
         moved = true;
       }
   }
