@@ -106,9 +106,12 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
     if (state.broken[i]) continue;
     const Vec3 at = s.middle.at(i), a = s.e.at(i);
     const float half = s.half[i];
+    // Where the thread is cut, its next segments are another piece.
+    uint32_t near_by = 1;
+    while (near_by < skip && i + near_by < m && !state.broken[i + near_by]) ++near_by;
     for (size_t n = 0; n < near_blocks; ++n) {
       const size_t b = s.near_block[n];
-      if (b < (i + skip + 1) / kBlock) continue;
+      if (b < (i + near_by + 1) / kBlock) continue;
       const float r = reach + half + s.block_radius[b];
       if (length2(s.block_middle[b] - at) > r * r) continue;
       const size_t first = b * kBlock;
@@ -118,7 +121,7 @@ void refresh_pairs(const Settings& settings, State& state, Scratch& s, std::span
       std::memcpy(&left, near, sizeof left);
       for (; left != 0; left &= left - 1) {
         const size_t j = first + static_cast<size_t>(std::countr_zero(left)) / 8;
-        if (j <= i + skip || j >= m || state.broken[j] || round_holes(i, j)) continue;
+        if (j <= i + near_by || j >= m || state.broken[j] || round_holes(i, j)) continue;
         const Vec3 p = between(state, i, j), c = s.e.at(j);
         float u, v;
         closest_points(p, a, c, u, v);

@@ -78,7 +78,8 @@ int count_passes(std::span<const Place> before, std::span<const Place> after, st
     for (size_t j = i + 2; j < segments; ++j) {
       const Place apart = middle[i] - middle[j];
       const double reach = radius[i] + radius[j];
-      if (dot(apart, apart) > reach * reach || broken[i] || broken[j]) continue;
+      // Three segments in a row are a kink. Turned over, it changes no knot (Reidemeister's first move).
+      if (dot(apart, apart) > reach * reach || broken[i] || broken[j] || (j == i + 2 && !broken[i + 1])) continue;
       count += passes({before[i], before[i + 1], before[j], before[j + 1]}, {after[i], after[i + 1], after[j], after[j + 1]});
     }
   return count;

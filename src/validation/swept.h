@@ -17,7 +17,7 @@ std::vector<Place> places(const thread::State& state);
 
 // Pairs of segments that pass through each other while every node moves in a straight line from `before` to `after`: their four
 // nodes lie in one plane at a time at which the segments meet. For short steps: a pair that passes and returns counts as none.
-// broken: per segment, 1: not a segment.
+// broken: per segment, 1: not a segment. The first and the last of three segments in a row do not count.
 int count_passes(std::span<const Place> before, std::span<const Place> after, std::span<const uint8_t> broken);
 
 }  // namespace catgut::validation

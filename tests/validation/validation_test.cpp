@@ -45,6 +45,15 @@ TEST(Contact, nothing_sinks_in_where_it_did_before) {
   }
 }
 
+// The hands of these pairs lead the ends of two pieces across each other. Their numbers in the thread are next to each other.
+TEST(Contact, ends_of_two_pieces_do_not_pass_each_other) {
+  for (const uint64_t seed : {124u, 424u, 488u}) {
+    float nearest = 1;
+    EXPECT_EQ(validation::pull_hooked_bights(seed, 8, 1, nearest), 0) << seed;
+    EXPECT_GT(nearest, 0.95f) << seed;
+  }
+}
+
 // The judge of contact/: what a wall goes round is inside, wherever its nearest face looks.
 TEST(Contact, a_point_is_inside_a_bent_wall_and_not_beside_it) {
   using namespace validation;
