@@ -70,9 +70,9 @@ bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, s
   return true;
 }
 
-// A node for which another face may be the nearest one now: the wall has landed so far beside it, or it has slid farther still.
-constexpr float kOtherPlace = 0.15e-3f;  // [m] by the wall
-constexpr float kSlides = 0.4f;          // of that, for a node's own way, which the thread's step knows
+// A node for which another face may be the nearest one now. [m] by which the wall has landed beside it, or it has slid itself,
+// which the thread's step knows.
+constexpr float kBeside = 0.15e-3f, kSlid = 0.375e-3f;
 void put_off_wall(const Model& m, State& s, const Scratch& k, const thread::SoftContact& c, Mover& mover) {
   const Surface& surface = surface_of(m, s);
   const float r = 0.5f * m.thread.material.diameter;
@@ -151,8 +151,7 @@ void put_thread_out(const Model& m, State& s, const Scratch& k, const Hands& han
     const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
     if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
     const Vec3 went = s.thread.v.at(c.node) * m.wall.step;
-    if (std::max(length2(beside), length2(went) * kSlides * kSlides) > kOtherPlace * kOtherPlace)
-      put_off_wall(m, s, k, c, mover);
+    if (length2(beside) > kBeside * kBeside || length2(went) > kSlid * kSlid) put_off_wall(m, s, k, c, mover);
   }
   // Thread between a tool and the wall: the tool goes. It may have come into other thread by that.
   if (mover.moved > 0 && put_all_apart(nullptr)) put_all_apart(&mover);
