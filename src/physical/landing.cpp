@@ -63,9 +63,9 @@ bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, s
     return (row.a == b || row.b == b) && row.kind == Row::Kind::contact && kind_of(row.key) != kDrapeRow &&
            dot(row.impulse, row.axis) > 0;
   };
-  // A needle that has way goes, too: it is as light as the thread, which that would stretch.
-  const bool has_way = model.falls && std::none_of(k.bodies.row.begin(), k.bodies.row.end(), presses);
-  if (has_way || (!mover && !model.falls)) body.pose.p -= by;
+  // A needle that nothing holds up goes instead: thread that is moved is stretched.
+  const bool is_free = model.falls && std::none_of(k.bodies.row.begin(), k.bodies.row.end(), presses);
+  if (is_free || (!mover && !model.falls)) body.pose.p -= by;
   else if (mover) mover->move(node, by), mover->move(node + 1, by);
   return true;
 }

@@ -29,7 +29,7 @@ class Excising final : public Surgeon {
 
  private:
   static constexpr size_t kBearings = 96;    // 1 mm apart, on a bowel of 30 mm
-  static constexpr float kSliver = 0.2e-3f;  // [kg] that a piece weighs at most that is not the specimen
+  static constexpr float kSliver = 0.2e-3f;  // [kg] at most of a piece that is not the specimen; chosen
   enum Stage {
     over_rim,
     down,

@@ -17,7 +17,6 @@
 namespace catgut::validation {
 
 using physical::BodyModel;
-using physical::Foot;
 
 const char* name_of(ContactBody body) {
   constexpr const char* kNames[kContactBodies] = {"a bowel end",          "two bowel ends",       "two pads of skin",
@@ -229,7 +228,6 @@ ContactBench::ContactBench(uint64_t s, ContactBody body) : seed(s) {
     }
   }
   middle = (low + high) * 0.5f;
-  bound(rest.wall, at_rest);
   skin = std::make_unique<Skin>(model, rest.wall);
   // Across the body, its ends drawn down beside it.
   std::vector<Vec3> path;

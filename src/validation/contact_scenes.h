@@ -52,10 +52,6 @@ struct ContactBench {
     std::vector<Vec3> center;  // [m]
     std::vector<float> radius;
   };
-  struct Sphere {
-    Vec3 at;
-    float radius;
-  };
   Vec3 direction();
   void bound(const wall::State& ws, Bounds& bounds) const;
   bool passes_wall(const wall::State& ws, const Bounds& bounds, Vec3 p, Vec3 q) const;
@@ -68,7 +64,7 @@ struct ContactBench {
   void forget();
   void step();
   void look();
-  Bounds now, at_rest;
+  Bounds now;
   Vec3 low, high, middle;      // [m] of the wall at rest, of its free part
   std::vector<uint32_t> free;  // faces that nothing holds
 };
