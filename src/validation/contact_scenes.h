@@ -55,11 +55,11 @@ struct ContactBench {
   Vec3 direction();
   void bound(const wall::State& ws, Bounds& bounds) const;
   bool passes_wall(const wall::State& ws, const Bounds& bounds, Vec3 p, Vec3 q) const;
-  // [m] by which a ball lies in the wall, whose skin follows it; beyond its whole diameter where the center is inside.
+  // [m] by which a ball lies in the wall, whose skin follows it; more than its radius where the center is inside.
   float wall_overlap(const wall::State& ws, const Bounds& bounds, Vec3 p, float r) const;
   float skin_distance(const wall::State& ws, const Bounds& bounds, Vec3 p) const;  // [m] 4 mm at most
   void see_wall();
-  // The tool at this pose touches neither wall, needle nor thread, as they are and as they were at rest.
+  // The tool at this pose touches neither wall, needle nor thread.
   bool clear(const Pose& tool, float opening);
   void forget();
   void step();
