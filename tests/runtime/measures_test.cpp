@@ -20,12 +20,19 @@ float peak(const Measures& m, const std::string& name) {
   return found == m.force.end() ? -1 : found->peak_n;
 }
 
+// Nobody holds a tool.
+TickInput nobody() {
+  TickInput input;
+  for (ToolInput& hand : input.hand) hand.connected = 0;
+  return input;
+}
+
 TEST(Measures, a_physical_scene_shows_its_thread_wall_and_forces) {
   const SceneSpec scene = read_scene("interrupted_tied");
   const auto model = build_model(scene);
   const StatePtr state = initial_state(*model);
   Jobs jobs(1);
-  for (int i = 0; i < 30; ++i) step(*model, *state, {}, jobs);
+  for (int i = 0; i < 30; ++i) step(*model, *state, nobody(), jobs);
   Measures m;
   m.stage_ms[0] = 3;
   measure(*model, *state, m);
