@@ -11,16 +11,19 @@
 namespace catgut::physical {
 namespace {
 
-constexpr int kRounds = 5;       // over contacts that share a node, or a tool
-constexpr float kStill = 1e-4f;  // [rad] of jaws from where they shall be
+constexpr int kRounds = 5;        // over contacts that share a node, or a tool
+constexpr float kStill = 1e-4f;   // [rad] of jaws from where they shall be
+constexpr float kClosed = 0.01f;  // [rad]
 
 // Puts nodes elsewhere. The pairs of the thread are looked at again when nodes have moved.
 struct Mover {
   thread::State& t;
-  float moved = 0;  // [m] all together: no node has moved farther
+  std::vector<Vec3>& put;  // [m] per node: by which it was moved
+  float moved = 0;         // [m] all together: no node has moved farther
   void move(uint32_t node, Vec3 by) {
+    by = clamped(put[node] + by, kFarthestOut) - put[node];
     t.x.set(node, t.x.at(node) + by);
-    moved += length(by);
+    put[node] += by, moved += length(by);
   }
   ~Mover() {
     if (moved == 0) return;
@@ -29,64 +32,91 @@ struct Mover {
   }
 };
 
+// The part of a body that the thread sees as one cone, where it is now.
+struct Part {
+  uint32_t body = 0;
+  const BodySphere *from = nullptr, *to = nullptr;
+  Vec3 a, z;             // [m]
+  float ra = 0, rb = 0;  // [m]
+};
+Part part_of(const Model& m, const State& s, const BodiesScratch& k, uint32_t index) {
+  Part part;
+  part.body = k.tool_body[index];
+  const BodyModel& model = m.bodies.body[part.body];
+  const Body& body = s.bodies.body[part.body];
+  const auto first = std::find(k.tool_body.begin(), k.tool_body.end(), part.body) - k.tool_body.begin();
+  const BodyCapsule& capsule = model.thread_capsule[index - static_cast<size_t>(first)];
+  part.from = &model.sphere[capsule.a], part.to = &model.sphere[capsule.b];
+  part.a = transform(body.pose, local(model, *part.from, body.opening));
+  part.z = transform(body.pose, local(model, *part.to, body.opening));
+  part.ra = k.tool[index].radius, part.rb = part.ra + k.tool[index].widens;
+  return part;
+}
+
 // Thread that a loose needle, or a tool that holds nothing, has hit otherwise than it was shown to (show_bodies). Jaws that
-// move press thread, and so do jaws on their inner side. No mover: the tool goes, not the thread.
-bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, size_t pair, Mover* mover) {
-  const uint32_t part = thread::partner_of(s.thread.key[pair]) - thread::kTool, b = k.bodies.tool_body[part];
+// move press thread. No mover: the tool goes, not the thread. side: of the tool, where the thread belongs; zero: where it is.
+bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, uint32_t node, uint32_t index, Vec3 side,
+               Mover* mover) {
+  const uint32_t b = k.bodies.tool_body[index];
   const BodyModel& model = m.bodies.body[b];
   Body& body = s.bodies.body[b];
-  const thread::Crossing& c = s.thread.crossing[pair];
-  const thread::ToolCapsule& tool = k.bodies.tool[part];
   const bool still = b >= hands.targets.size() || std::abs(hands.targets[b].opening - body.opening) < kStill;
   const bool rigid = model.falls ? k.bodies.moving[b].loose : still && body.grip.what == Gripped::nothing;
-  if (!rigid || c.touch == thread::Touch::unknown) return false;
-  const auto first = std::find(k.bodies.tool_body.begin(), k.bodies.tool_body.end(), b) - k.bodies.tool_body.begin();
-  const BodyCapsule& capsule = model.thread_capsule[part - static_cast<size_t>(first)];
-  const Vec3 a = transform(body.pose, local(model, model.sphere[capsule.a], body.opening)),
-             z = transform(body.pose, local(model, model.sphere[capsule.b], body.opening));
-  const float ra = tool.radius, rb = ra + tool.widens, r = 0.5f * m.thread.material.diameter;
-  const uint32_t node = thread::segment_of(s.thread.key[pair]);
+  if (!rigid) return false;
+  const auto [owner, from, to, a, z, ra, rb] = part_of(m, s, k.bodies, index);
+  const float r = 0.5f * m.thread.material.diameter;
   const Vec3 p = s.thread.position(node), q = s.thread.position(node + 1);
   const float reach = 0.5f * (distance(p, q) + distance(a, z)) + r + std::max(ra, rb);
   if (length2(p + q - a - z) > 4 * reach * reach) return false;
   float along = 0, at = 0;
   nearest_of_segments(p, q, a, z, along, at);
-  // A crossing knows on which side of each other they belong.
-  Vec3 apart = lerp(p, q, along) - lerp(a, z, at), normal = normalized(apart, c.normal);
-  if (dot(normal, c.normal) < -0.3f) normal = -normal;
-  const float jaw = model.sphere[capsule.a].jaw;
-  if (jaw != 0 && dot(normal, rotate(body.pose.q, {-jaw, 0, 0})) > 0.3f) return false;
-  const float out = r + ra + (rb - ra) * at - dot(apart, normal) - kOnBodyLands;
+  Vec3 apart = lerp(p, q, along) - lerp(a, z, at), normal = normalized(apart, side);
+  if (dot(normal, side) < -0.3f) normal = -normal;
+  const float jaw = from->jaw;
+  // Between closed jaws lies half of it in each. Where instruments pass through each other, a strand in both gives way.
+  const bool between = jaw != 0 && dot(normal, rotate(body.pose.q, {-jaw, 0, 0})) > 0.3f;
+  if (between && body.opening > kClosed && !m.bodies.pair_contact) return false;
+  const float out = r + ra + (rb - ra) * at - dot(apart, normal) - (between ? kBetweenLands : kOnBodyLands);
   if (out <= 0) return false;
   const Vec3 by = normal * std::min(out, kFarthestOut);
   const auto presses = [&](const Row& row) {
     return (row.a == b || row.b == b) && row.kind == Row::Kind::contact && kind_of(row.key) != kDrapeRow &&
            dot(row.impulse, row.axis) > 0;
   };
-  // A needle that nothing holds up goes instead: thread that is moved is stretched.
+  // A needle that nothing holds up goes instead: thread that is moved is stretched. With one that is held up, what presses it.
   const bool is_free = model.falls && std::none_of(k.bodies.row.begin(), k.bodies.row.end(), presses);
-  if (is_free || (!mover && !model.falls)) body.pose.p -= by;
-  else if (mover) mover->move(node, by), mover->move(node + 1, by);
+  if (mover && !is_free) {
+    mover->move(node, by), mover->move(node + 1, by);
+    return true;
+  }
+  body.pose.p -= by;
+  for (uint32_t other = 0; !is_free && model.falls && other < s.bodies.body.size(); ++other) {
+    const auto on_it = [&](const Row& row) { return presses(row) && !row.on_wall && (row.a == other || row.b == other); };
+    if (other != b && std::any_of(k.bodies.row.begin(), k.bodies.row.end(), on_it)) s.bodies.body[other].pose.p -= by;
+  }
   return true;
 }
 
-// A node for which another face may be the nearest one now. [m] by which the wall has landed beside it, or it has slid itself,
-// which the thread's step knows.
-constexpr float kBeside = 0.15e-3f, kSlid = 0.375e-3f;
-void put_off_wall(const Model& m, State& s, const Scratch& k, const thread::SoftContact& c, Mover& mover) {
+// A node for which another face may be the nearest one now. [m] by which the wall has landed beside it, or a tool has put it
+// elsewhere; or it has slid itself, which the thread's step knows.
+constexpr float kBeside = 0.15e-3f, kSlid = 0.375e-3f, kDeep = 0.4e-3f;
+void put_off_wall(const Model& m, State& s, const Scratch& k, uint32_t node, Vec3 outward, Mover& mover) {
   const Surface& surface = surface_of(m, s);
   const float r = 0.5f * m.thread.material.diameter;
-  const Vec3 p = s.thread.position(c.node);
-  Foot best;
-  float far = 1e-3f;
-  for (uint32_t f = k.search.node_first[c.node]; f < k.search.node_first[c.node + 1]; ++f)
+  const Vec3 p = s.thread.position(node);
+  NearestFoot nearest;
+  nearest.best.gap = 1e-3f;
+  for (uint32_t f = k.search.node_first[node]; f < k.search.node_first[node + 1]; ++f)
     for (uint32_t q = surface.first_of_face[k.search.node_face[f]]; q < surface.first_of_face[k.search.node_face[f] + 1]; ++q) {
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
-      if (const float d = distance(foot.at, p); d < far && dot(foot.facing, c.normal) > -0.2f) best = foot, far = d;
+      if (dot(foot.facing, outward) > -0.2f) nearest.offer(foot, p);
     }
-  // From deep within nothing says which way is out.
+  nearest.settle_side(m.wall, s.wall, surface, p);
+  const Foot& best = nearest.best;
+  // From deep within, only a face that looks as the last one says which way is out.
   const float out = r - best.gap - kThreadLands;
-  if (far < 1e-3f && out > 0 && best.gap > -r) mover.move(c.node, best.normal * std::min(out, kFarthestOut));
+  const float deepest = dot(best.normal, outward) > 0.5f ? kDeep : r;
+  if (nearest.shared > 0 && out > 0 && best.gap > -deepest) mover.move(node, best.normal * std::min(out, kFarthestOut));
 }
 
 // The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
@@ -133,28 +163,67 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
   }
 }
 
-void put_thread_out(const Model& m, State& s, const Scratch& k, const Hands& hands) {
-  Mover mover{s.thread};
+void put_thread_out(const Model& m, State& s, Scratch& k, const Hands& hands) {
+  k.put.assign(s.thread.nodes(), {});
+  thread::State& t = s.thread;
+  Mover mover{t, k.put};
+  constexpr float kElsewhere = 0.1e-3f, kLongest = 2e-3f;  // [m] the latter: of a segment and the thread's radius
+  const float r = 0.5f * m.thread.material.diameter;
+  const auto is_own = [](const thread::ToolCapsule& c, uint32_t segment) {
+    return segment >= c.own_first && segment <= c.own_last;
+  };
   const bool asleep = s.sleep.any();
   const auto put_all_apart = [&](Mover* by) {
     bool moved = false;
-    for (size_t i = 0; i < s.thread.key.size(); ++i)
-      if (thread::partner_of(s.thread.key[i]) >= thread::kTool && !(asleep && s.sleep.at(thread::segment_of(s.thread.key[i]))))
-        moved |= put_apart(m, s, k, hands, i, by);
+    for (size_t i = 0; i < t.key.size(); ++i) {
+      const uint32_t segment = thread::segment_of(t.key[i]), partner = thread::partner_of(t.key[i]);
+      if (partner < thread::kTool || t.crossing[i].touch == thread::Touch::unknown || (asleep && s.sleep.at(segment))) continue;
+      moved |= put_apart(m, s, k, hands, segment, partner - thread::kTool, t.crossing[i].normal, by);
+    }
+    // What was not near each other before one of them was put elsewhere.
+    for (uint32_t index = 0; index < k.bodies.tool_body.size(); ++index) {
+      const Body& body = s.bodies.body[k.bodies.tool_body[index]];
+      const bool tool_is = length2(body.pose.p - body.shown.p) > kElsewhere * kElsewhere;
+      if (!tool_is && mover.moved == 0) continue;
+      const Part part = part_of(m, s, k.bodies, index);
+      const float far = 0.5f * distance(part.a, part.z) + std::max(part.ra, part.rb) + kLongest;
+      for (uint32_t i = 0; i < t.segments(); ++i) {
+        if (t.broken[i] || length2(t.x.at(i) - (part.a + part.z) * 0.5f) > far * far || (asleep && s.sleep.at(i)) ||
+            (!tool_is && std::max(length2(k.put[i]), length2(k.put[i + 1])) < kElsewhere * kElsewhere) ||
+            std::binary_search(t.key.begin(), t.key.end(), i << 16 | (thread::kTool + index)) ||
+            is_own(k.bodies.tool[index], i))
+          continue;
+        moved |= put_apart(m, s, k, hands, i, index, {}, by);
+      }
+    }
     return moved;
   };
-  for (int round = 0; round < kRounds; ++round)
-    if (!put_all_apart(&mover)) break;
-  // The wall that has come farther toward a node than the thread's step foresaw.
-  for (const thread::SoftContact& c : k.contact) {
-    const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]);
-    const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
-    if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
-    const Vec3 went = s.thread.v.at(c.node) * m.wall.step;
-    if (length2(beside) > kBeside * kBeside || length2(went) > kSlid * kSlid) put_off_wall(m, s, k, c, mover);
+  // The wall that has come farther toward a node than the thread's step foresaw, or to which a tool has moved the node.
+  const auto put_all_off_wall = [&] {
+    for (const thread::SoftContact& c : k.contact) {
+      const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]) - k.put[c.node];
+      const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
+      if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
+      const Vec3 went = s.thread.v.at(c.node) * m.wall.step;
+      const auto in_its_patch = [&] {
+        return nearest_on_patch(m.wall, s.wall, surface_of(m, s), c.patch, t.position(c.node)).gap < r - kThreadLands;
+      };
+      if (length2(beside) > kBeside * kBeside || length2(went) > kSlid * kSlid || in_its_patch())
+        put_off_wall(m, s, k, c.node, c.normal, mover);
+    }
+    for (uint32_t i = 0, at = 0; mover.moved > 0 && i < t.nodes(); ++i) {
+      while (at < k.contact.size() && k.contact[at].node < i) ++at;
+      if ((at < k.contact.size() && k.contact[at].node == i) || length2(k.put[i]) < kElsewhere * kElsewhere) continue;
+      put_off_wall(m, s, k, i, normalized(-k.put[i]), mover);
+    }
+  };
+  // Thread between a tool and the wall: then the tool goes, and all is looked at once more.
+  for (int pass = 0; pass < 2; ++pass) {
+    for (int round = 0; round < kRounds; ++round)
+      if (!put_all_apart(&mover)) break;
+    put_all_off_wall();
+    if (mover.moved == 0 || !put_all_apart(nullptr)) break;
   }
-  // Thread between a tool and the wall: the tool goes. It may have come into other thread by that.
-  if (mover.moved > 0 && put_all_apart(nullptr)) put_all_apart(&mover);
 }
 
 }  // namespace catgut::physical

@@ -42,7 +42,7 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   lips.inverse = wall::Inverse(rows);
   for (wall::Inverse* inverse : {&coupling.inverse, &lips.inverse}) inverse->need(s.wall.topology, {});  // takes its room
   const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
-  contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), tilt.reserve(16 * n);
+  contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), put.reserve(s.thread.nodes()), tilt.reserve(16 * n);
   coupling.reserve(n);
   lips.reserve(3 * columns);
   search.reserve(m.wall, s.wall, s.thread.nodes());
@@ -147,6 +147,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
   uint32_t last_node = 0;
   constexpr float kApart = 0.01e-3f;  // [m]
   k.foot.clear();
+  uint32_t within = 0;  // of the node that is looked at
   const auto add = [&](uint32_t node, const Foot& foot, const thread::SoftContact* memory, bool may_share) {
     thread::SoftContact c;
     c.node = node, c.patch = foot.patch, c.normal = foot.normal, c.friction = m.surface_friction;
@@ -154,6 +155,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
       c.normal_impulse = memory->normal_impulse;
       c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
     }
+    c.within = within;
     // A contact that presses has a point of its own: its friction elsewhere would turn the wall without turning the thread.
     const bool touches = c.normal_impulse > 0 || foot.gap - r < kApart;
     if (may_share && !touches && shared > 0 && shared < 3 && last_node + 1 == node && !s.thread.broken[last_node] &&
@@ -194,21 +196,20 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
     const thread::SoftContact* memory = nullptr;  // the one that presses most
     for (size_t q = old; q < s.contact.size() && s.contact[q].node == i; ++q)
       if (!memory || s.contact[q].normal_impulse > memory->normal_impulse) memory = &s.contact[q];
+    within = memory ? memory->within : 1;
     const Vec3 p = s.thread.position(i);
     if (!memory && k.search.moved + static_cast<double>(distance(p, k.search.node_seen[i]) + 1.5f * h * k.search.speed) <
                        k.search.node_due[i])
       continue;
-    Foot best;
-    best.gap = 1e9f;
-    float facing = -1, nearest_box = 1e9f;
+    NearestFoot nearest;
+    Foot& best = nearest.best;
+    float nearest_box = 1e9f;
     const auto look = [&](uint32_t patch) {
       if (least_of_part(surface, k.search, patch, p) > std::abs(best.gap) + 1e-6f) return;
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, patch, p, corners_in(k.search, patch));
       // A node that was pressed to one side is never looked at from the other.
       if (memory && memory->normal_impulse > 0 && dot(foot.facing, memory->normal) < -0.2f) return;
-      const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);
-      if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) return;
-      best = foot, facing = front;
+      nearest.offer(foot, p);
     };
     const uint32_t known = memory && memory->patch < surface.patch.size() ? memory->patch : wall::kNone;
     if (known != wall::kNone) look(known);  // most likely still the nearest: the others need not be searched
@@ -238,6 +239,7 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
           look(q);
     }
     if (all && close.count > kClose) close.within = 0;
+    nearest.settle_side(m.wall, s.wall, surface, p);
     constexpr float kSpare = 0.2e-3f;  // [m]
     k.search.node_seen[i] = p;
     k.search.node_due[i] = k.search.moved + static_cast<double>(nearest_box - r - far_move - kSpare);
@@ -313,13 +315,14 @@ void find_again(void* context, std::span<thread::SoftContact> contacts, size_t i
       if (has(i)) return true;
     return false;
   };
-  Foot best = nearest_on_patch(slid.m.wall, slid.s.wall, surface, c.patch, node);
+  NearestFoot nearest;
+  nearest.offer(nearest_on_patch(slid.m.wall, slid.s.wall, surface, c.patch, node), node);
+  const Foot& best = nearest.best;
   bool in_pit = false;
   if (best.on_edge) {
     // Beyond the patch: another one that continues it.
     const Foot edge = best;
     const uint32_t i = slid.some_asleep ? slid.k.awake.node[c.node] : c.node;
-    float facing = dot(normalized(node - best.at), best.facing);
     for (uint32_t f = search.node_first[i]; f < search.node_first[i + 1]; ++f) {
       const uint32_t face = search.node_face[f];
       const FaceBox& box = box_of(slid.m.wall, slid.s.wall, search, face);
@@ -335,11 +338,12 @@ void find_again(void* context, std::span<thread::SoftContact> contacts, size_t i
           in_pit = true;
           continue;
         }
-        const float far = std::abs(foot.gap), front = dot(normalized(node - foot.at), foot.facing);
-        if (far > std::abs(best.gap) + 1e-7f || (far > std::abs(best.gap) - 1e-7f && front < facing)) continue;
-        best = foot, facing = front;
+        // At the bottom of a pit, behind the faces that meet there, each contact keeps its own.
+        if (edge.gap < 0 && foot.gap < 0 && length2(foot.at - edge.at) < kSame * kSame && other_has(q)) continue;
+        nearest.offer(foot, node);
       }
     }
+    nearest.settle_side(slid.m.wall, slid.s.wall, surface, node);
   }
   c.offset = best.at - slid.k.coupling.at[c.point], c.normal = in_pit ? best.facing : best.normal, c.patch = best.patch;
 }
@@ -496,6 +500,7 @@ void step(const Model& m, State& s, Scratch& k, const Hands& hands, Jobs& jobs) 
     s.lip.assign(k.lips.contact.begin(), k.lips.contact.end());
   }
   if (bodies) solve_bodies(m.bodies, m.wall, s.wall, k.wall, s.bodies, hands.targets, k.bodies);
+  wall::keep_volumes(m.wall, s.wall, k.wall);
   wall::finish_step(m.wall, s.wall, jobs);
   if (bodies) {
     put_tools_out(m, s, k);

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/clones.h"
+#include "core/elementary.h"
 #include "wall/cut.h"
 #include "wall/patch.h"
 
@@ -143,6 +144,25 @@ std::array<Vec3, 4> part_corners(const wall::State& s, const Corners& c, const P
     p[2] = place_on(s, c, patch.at[1], 1), p[3] = place_on(s, c, patch.at[0], 1);
   }
   return p;
+}
+
+// A patch with its corners; of a strip the two on the inner side first. corner: of a fragment's patch, where they are known.
+wall::Patch patch_corners(const wall::State& s, const Corners& c, const Patch& patch, const Vec3* corner = nullptr) {
+  wall::Patch b;
+  if (patch.part) {
+    if (corner) std::copy_n(corner, 4, b.p);
+    else std::copy_n(part_corners(s, c, patch).data(), 4, b.p);
+    if (patch.side != 0) b.quad = patch.quad;
+  } else if (patch.side != 0) {
+    b.quad = c.quad;
+    for (uint32_t k = 0; k < c.count(); ++k)
+      b.p[k] = mid(s, c.column[k]) + director(s, c.column[k]) * static_cast<float>(patch.side);
+  } else {
+    const uint32_t from = c.column[patch.edge], to = c.column[(patch.edge + 1) % c.count()];
+    b.p[0] = mid(s, from) - director(s, from), b.p[1] = mid(s, to) - director(s, to);
+    b.p[2] = mid(s, to) + director(s, to), b.p[3] = mid(s, from) + director(s, from);
+  }
+  return b;
 }
 
 // Nearest point of a patch, in its coordinates. Begins with the foot on a parallelogram.
@@ -282,56 +302,36 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
                       const Vec3* corner) {
   const Patch& patch = surface.patch[index];
   const Corners c = corners_of(m, s.topology, patch.face);
+  const wall::Patch b = patch_corners(s, c, patch, corner);
+  float xi = 0, eta = 0;
+  nearest(b, p, xi, eta);
   Foot foot;
   foot.patch = index;
-  wall::Patch b;
-  float xi = 0, eta = 0;
+  foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
+  if (patch.side != 0) foot.facing = foot.facing * static_cast<float>(patch.side);
+  foot.on_edge = b.quad ? std::max(std::abs(xi), std::abs(eta)) > 0.9999f : std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
   if (patch.part) {
     // Within the patch by a hair, so that the point belongs to this fragment and not to its neighbor.
     constexpr float kWithin = 0.998f;
     const uint32_t face = wall::face_of_element(m, s.topology, patch.face);
     const auto& at = patch.at;
-    if (corner) std::copy_n(corner, 4, b.p);
-    else std::copy_n(part_corners(s, c, patch).data(), 4, b.p);
-    if (patch.side != 0) {
-      b.quad = patch.quad;
-      nearest(b, p, xi, eta);
-      foot.facing = cross(b.along_xi(eta), b.along_eta(xi)) * static_cast<float>(patch.side);
-      if (b.quad) {
-        foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
-        const float x = 0.5f * (1 + kWithin * xi), y = 0.5f * (1 + kWithin * eta);
-        foot.point = {face, at[0][0] + (at[1][0] - at[0][0]) * x, at[0][1] + (at[3][1] - at[0][1]) * y, 0};
-      } else {
-        foot.on_edge = std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
-        const float x = 0.5f * (kWithin * xi + (1 - kWithin) * 0.66f), y = 0.5f * (kWithin * eta + (1 - kWithin) * 0.66f);
-        foot.point = {face, at[0][0] + (at[1][0] - at[0][0]) * x + (at[2][0] - at[0][0]) * y,
-                      at[0][1] + (at[1][1] - at[0][1]) * x + (at[2][1] - at[0][1]) * y, 0};
-      }
-      foot.point.zeta = static_cast<float>(patch.side);
-    } else {
-      nearest(b, p, xi, eta);
-      foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
-      foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
+    if (patch.side == 0) {
       const float x = 0.5f * (1 + kWithin * xi), in = 1 - kWithin;
       foot.point = {face, 0, 0, eta};
       foot.point.xi = (at[0][0] + (at[1][0] - at[0][0]) * x) * (1 - in) + at[2][0] * in;
       foot.point.eta = (at[0][1] + (at[1][1] - at[0][1]) * x) * (1 - in) + at[2][1] * in;
+    } else if (b.quad) {
+      const float x = 0.5f * (1 + kWithin * xi), y = 0.5f * (1 + kWithin * eta);
+      foot.point = {face, at[0][0] + (at[1][0] - at[0][0]) * x, at[0][1] + (at[3][1] - at[0][1]) * y, 0};
+    } else {
+      const float x = 0.5f * (kWithin * xi + (1 - kWithin) * 0.66f), y = 0.5f * (kWithin * eta + (1 - kWithin) * 0.66f);
+      foot.point = {face, at[0][0] + (at[1][0] - at[0][0]) * x + (at[2][0] - at[0][0]) * y,
+                    at[0][1] + (at[1][1] - at[0][1]) * x + (at[2][1] - at[0][1]) * y, 0};
     }
+    if (patch.side != 0) foot.point.zeta = static_cast<float>(patch.side);
   } else if (patch.side != 0) {
-    b.quad = c.quad;
-    for (uint32_t k = 0; k < c.count(); ++k)
-      b.p[k] = mid(s, c.column[k]) + director(s, c.column[k]) * static_cast<float>(patch.side);
-    nearest(b, p, xi, eta);
     foot.point = {patch.face, xi, eta, static_cast<float>(patch.side)};
-    foot.facing = cross(b.along_xi(eta), b.along_eta(xi)) * static_cast<float>(patch.side);
-    foot.on_edge = c.quad ? std::max(std::abs(xi), std::abs(eta)) > 0.9999f : std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
   } else {
-    const uint32_t from = c.column[patch.edge], to = c.column[(patch.edge + 1) % c.count()];
-    b.p[0] = mid(s, from) - director(s, from), b.p[1] = mid(s, to) - director(s, to);
-    b.p[2] = mid(s, to) + director(s, to), b.p[3] = mid(s, from) + director(s, from);
-    nearest(b, p, xi, eta);
-    foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
-    foot.on_edge = std::max(std::abs(xi), std::abs(eta)) > 0.9999f;
     const float q = xi;
     const float quads[4][2] = {{q, -1}, {1, q}, {-q, 1}, {-1, -q}}, prisms[3][2] = {{1 + q, 0}, {1 - q, 1 + q}, {0, 1 - q}};
     const float* at = c.quad ? quads[patch.edge] : prisms[patch.edge];
@@ -349,6 +349,36 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
     foot.inward = (b.quad ? b.at(0, 0) : (b.p[0] + b.p[1] + b.p[2]) / 3.0f) - foot.at;
   }
   return foot;
+}
+
+void NearestFoot::offer(const Foot& foot, Vec3 p) {
+  constexpr float kSame = 1e-7f;  // [m]
+  const float far = std::abs(foot.gap), least = std::abs(best.gap), in_front = dot(normalized(p - foot.at), foot.facing);
+  if (far > least + kSame) return;
+  if (far < least - kSame) shared = 0;
+  if (shared < sharing.size()) sharing[shared++] = foot.patch;
+  if (far > least - kSame && in_front < front) return;
+  best = foot, front = in_front;
+}
+
+void NearestFoot::settle_side(const wall::Model& m, const wall::State& s, const Surface& surface, Vec3 p) {
+  if (shared < 3 || !best.on_edge || best.gap <= 0) return;
+  Vec3 about{};
+  bool behind = false;
+  for (uint32_t i = 0; i < shared; ++i) {
+    const Patch& patch = surface.patch[sharing[i]];
+    const wall::Patch b = patch_corners(s, corners_of(m, s.topology, patch.face), patch);
+    const uint32_t n = b.quad ? 4 : 3;
+    uint32_t k = 0;
+    for (uint32_t c = 1; c < n; ++c)
+      if (length2(b.p[c] - best.at) < length2(b.p[k] - best.at)) k = c;
+    const Foot foot = nearest_on_patch(m, s, surface, sharing[i], p);
+    behind |= dot(p - foot.at, foot.facing) < 0;
+    about += foot.facing * acos(dot(normalized(b.p[(k + 1) % n] - b.p[k]), normalized(b.p[(k + n - 1) % n] - b.p[k])));
+  }
+  if (!behind || dot(p - best.at, about) >= 0) return;
+  best.normal = best.facing = normalized(about, best.facing);
+  best.gap = -best.gap;
 }
 
 void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t nodes) {

@@ -61,6 +61,20 @@ struct Foot {
 Foot nearest_on_patch(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p,
                       const Vec3* corner = nullptr);
 
+// The foot nearest to a point, patch by patch. Of one place on several patches, that of the patch which the point is most in
+// front of.
+struct NearestFoot {
+  Foot best;
+  float front = -1;                   // cosine
+  std::array<uint32_t, 8> sharing{};  // patches that have this foot
+  uint32_t shared = 0;
+  NearestFoot() { best.gap = 1e9f; }
+  void offer(const Foot& foot, Vec3 p);
+  // At the corner of a pit a point may be in front of one face and yet inside. The sum of the normals, each times the angle of
+  // its patch there, tells (Baerentzen and Aanaes 2005, 10.1109/TVCG.2005.49).
+  void settle_side(const wall::Model& model, const wall::State& state, const Surface& surface, Vec3 p);
+};
+
 // A box about one face of the wall in the present step. A lower bound of a distance saves most exact searches.
 struct FaceBox {
   uint32_t step = 0;             // SurfaceSearch::step in which it was made

@@ -226,10 +226,10 @@ inline Modes<S> element_force(const Get& c, const Modes<S>& m, Turn<S>& q, int s
 
 // No formula above bounds a corner's volume: pressed or bent far enough, it turns inside out, and nothing can lie against it.
 // So the volume that its edges and its director span resists below a part of what it is at rest, four times as stiff as the
-// thickness. Adds to the forces on the element's N corners, and to the energy.
-constexpr float kLeastVolume = 0.5f, kGuard = 4;
+// thickness. Adds to the forces on the element's N corners, and to the energy. True where one has less than kFlat of it left.
+constexpr float kLeastVolume = 0.5f, kGuard = 4, kFlat = 0.2f, kFlatAtRest = 0.3f;
 template <size_t N, class S, class Get>
-inline void guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<S> (&dir)[4], Vec3Of<S> (&mid_force)[4],
+inline bool guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<S> (&dir)[4], Vec3Of<S> (&mid_force)[4],
                           Vec3Of<S> (&dir_force)[4], S* energy = nullptr) {
   // Few elements need more than the first test, against the volume at rest in their middle.
   const S zero(0.0f), span(4.0f);
@@ -241,7 +241,8 @@ inline void guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<
     volume[k] = dot(area[k], dir[k]);
     low = low + above(middle * S(0.8f), volume[k]);
   }
-  if (!any(low)) return;
+  if (!any(low)) return false;
+  S flat(0.0f);
   constexpr float kXi[] = {-1, 1, 1, -1}, kEta[] = {-1, -1, 1, 1};
   for (size_t k = 0; k < N; ++k) {
     S rest = middle;
@@ -253,7 +254,9 @@ inline void guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<
       rest = span * dot(cross(a1 + h1 * eta, a2 + h1 * xi), d0 + h2 * xi + h3 * eta + h4 * both);
     }
     // A corner that is nearly flat already at rest is left as it is.
-    const S missing = larger(S(kLeastVolume) * rest - volume[k], zero) * above(rest, middle * S(0.3f));
+    const S counts = above(rest, middle * S(kFlatAtRest));
+    const S missing = larger(S(kLeastVolume) * rest - volume[k], zero) * counts;
+    flat = flat + above(S(kFlat) * rest, volume[k]) * counts;
     const S stiff = S(kGuard / static_cast<float>(N)) * c(kThick) / larger(rest * rest, S(1e-30f)), f = stiff * missing;
     const size_t next = (k + 1) % N, last = (k + N - 1) % N;
     const Vec3Of<S> on_next = cross(mid[last] - mid[k], dir[k]) * f, on_last = cross(dir[k], mid[next] - mid[k]) * f;
@@ -262,4 +265,5 @@ inline void guard_corners(const Get& c, const Vec3Of<S> (&mid)[4], const Vec3Of<
     mid_force[k] = mid_force[k] - on_next - on_last;
     if (energy) *energy = *energy + S(0.5f) * f * missing;
   }
+  return any(flat);
 }

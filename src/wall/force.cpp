@@ -67,13 +67,15 @@ void BlockForces(const ElementBlock* block, const BlockCorners* corners, const F
       hn::Store(q.x.v, d, frame.x.data() + part), hn::Store(q.y.v, d, frame.y.data() + part);
       hn::Store(q.z.v, d, frame.z.data() + part), hn::Store(q.w.v, d, frame.w.data() + part);
       Vec3W fm[4], fd[4];
+      bool flat = false;
       if (quads) {
         quad_corners(f, quarter, fm, fd);
-        guard_corners<4>(constants, mid, dir, fm, fd);
+        flat = guard_corners<4>(constants, mid, dir, fm, fd);
       } else {
         triangle_corners(f, half, third, fm, fd);
-        guard_corners<3>(constants, mid, dir, fm, fd);
+        flat = guard_corners<3>(constants, mid, dir, fm, fd);
       }
+      force[b].flat = (part > 0 && force[b].flat) || flat;
       const auto zero = hn::Zero(d);
       for (size_t k = 0; k < 4; ++k) {
         hn::StoreInterleaved4(fm[k].x.v, fm[k].y.v, fm[k].z.v, zero, d, &force[b].mid[k][part].x);

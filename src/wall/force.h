@@ -26,6 +26,7 @@ struct alignas(64) BlockTurn {
 // Forces on the columns at the corners of each element.
 struct alignas(64) BlockForce {
   Float4 mid[4][kLanesOfBlock], dir[4][kLanesOfBlock];
+  bool flat = false;  // a corner of one of them has nearly no volume left
 };
 
 // Forces of blocks [first, last) at y (mid-surface point and director of each column in turn); turns the frames by one step.
