@@ -99,7 +99,7 @@ bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, u
 
 // A node for which another face may be the nearest one now. [m] by which the wall has landed beside it, or a tool has put it
 // elsewhere; or it has slid itself, which the thread's step knows.
-constexpr float kBeside = 0.15e-3f, kSlid = 0.375e-3f, kDeep = 0.4e-3f;
+constexpr float kBeside = 0.15e-3f, kSlid = 0.375e-3f, kDeep = 0.4e-3f, kRests = 0.05e-3f;
 void put_off_wall(const Model& m, State& s, const Scratch& k, uint32_t node, Vec3 outward, Mover& mover) {
   const Surface& surface = surface_of(m, s);
   const float r = 0.5f * m.thread.material.diameter;
@@ -204,11 +204,12 @@ void put_thread_out(const Model& m, State& s, Scratch& k, const Hands& hands) {
       const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]) - k.put[c.node];
       const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
       if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
-      const Vec3 went = s.thread.v.at(c.node) * m.wall.step;
+      const float went2 = length2(s.thread.v.at(c.node) * m.wall.step), beside2 = length2(beside);
       const auto in_its_patch = [&] {
         return nearest_on_patch(m.wall, s.wall, surface_of(m, s), c.patch, t.position(c.node)).gap < r - kThreadLands;
       };
-      if (length2(beside) > kBeside * kBeside || length2(went) > kSlid * kSlid || in_its_patch())
+      if (beside2 > kBeside * kBeside || went2 > kSlid * kSlid ||
+          ((beside2 > kRests * kRests || went2 > kRests * kRests) && in_its_patch()))
         put_off_wall(m, s, k, c.node, c.normal, mover);
     }
     for (uint32_t i = 0, at = 0; mover.moved > 0 && i < t.nodes(); ++i) {

@@ -147,7 +147,8 @@ std::array<Vec3, 4> part_corners(const wall::State& s, const Corners& c, const P
 }
 
 // A patch with its corners; of a strip the two on the inner side first. corner: of a fragment's patch, where they are known.
-wall::Patch patch_corners(const wall::State& s, const Corners& c, const Patch& patch, const Vec3* corner = nullptr) {
+[[gnu::always_inline]] inline wall::Patch patch_corners(const wall::State& s, const Corners& c, const Patch& patch,
+                                                        const Vec3* corner = nullptr) {
   wall::Patch b;
   if (patch.part) {
     if (corner) std::copy_n(corner, 4, b.p);
@@ -349,16 +350,6 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
     foot.inward = (b.quad ? b.at(0, 0) : (b.p[0] + b.p[1] + b.p[2]) / 3.0f) - foot.at;
   }
   return foot;
-}
-
-void NearestFoot::offer(const Foot& foot, Vec3 p) {
-  constexpr float kSame = 1e-7f;  // [m]
-  const float far = std::abs(foot.gap), least = std::abs(best.gap), in_front = dot(normalized(p - foot.at), foot.facing);
-  if (far > least + kSame) return;
-  if (far < least - kSame) shared = 0;
-  if (shared < sharing.size()) sharing[shared++] = foot.patch;
-  if (far > least - kSame && in_front < front) return;
-  best = foot, front = in_front;
 }
 
 void NearestFoot::settle_side(const wall::Model& m, const wall::State& s, const Surface& surface, Vec3 p) {

@@ -3,6 +3,7 @@
 // nearest surface point of thread nodes and of other parts of the wall. Reads the wall's topology and motion.
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -69,7 +70,16 @@ struct NearestFoot {
   std::array<uint32_t, 8> sharing{};  // patches that have this foot
   uint32_t shared = 0;
   NearestFoot() { best.gap = 1e9f; }
-  void offer(const Foot& foot, Vec3 p);
+  void offer(const Foot& foot, Vec3 p) {
+    constexpr float kSame = 1e-7f;  // [m]
+    const float far = std::abs(foot.gap), least = std::abs(best.gap);
+    if (far > least + kSame) return;
+    const float in_front = dot(normalized(p - foot.at), foot.facing);
+    if (far < least - kSame) shared = 0;
+    if (shared < sharing.size()) sharing[shared++] = foot.patch;
+    if (far > least - kSame && in_front < front) return;
+    best = foot, front = in_front;
+  }
   // At the corner of a pit a point may be in front of one face and yet inside. The sum of the normals, each times the angle of
   // its patch there, tells (Baerentzen and Aanaes 2005, 10.1109/TVCG.2005.49).
   void settle_side(const wall::Model& model, const wall::State& state, const Surface& surface, Vec3 p);
