@@ -138,8 +138,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
   constexpr uint32_t kRun = 8;  // spheres
   // A wall gives in its thickness, which the solve does not know: jaws that close on it from both sides would need any force,
   // and so would jaws that open between walls.
-  constexpr float kFlattened = 0.2e-3f;  // [m]
-  constexpr float kInner = 0.3f;         // of a contact's normal, along the way in which the jaw opens: on its inner side
+  constexpr float kInner = 0.3f;  // of a contact's normal, along the way in which the jaw opens: on its inner side
   // Between closed jaws the wall is thinner than it is there. When they let go, it would have to leave both at once, with 40 N:
   // until they have opened as far, they press it with no more than this.
   constexpr float kParting = 0.2f;     // [N] of each contact
@@ -228,8 +227,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       row.friction = m.wall_friction;
       if (inside) row.along_limit = kParting * h;
       const bool inner = dot(foot.normal, rotate(body.pose.q, {static_cast<float>(jaw), 0, 0})) > kInner;
-      const bool closing_jaws = moving.opening != body.opening;
-      if (jaw != 0 && (closing_jaws || (inner && gap > -kFlattened))) row.soft = 1 / (wall::kThicknessStiffness * h * h);
+      if (jaw != 0 && (inner || moving.opening != body.opening)) row.soft = 1 / (wall::kThicknessStiffness * h * h);
       if (memory) {
         const float press = std::max(0.0f, dot(memory->impulse, memory->axis));
         row.impulse = foot.normal * press + across(across(memory->impulse, memory->axis), foot.normal);

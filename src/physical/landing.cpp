@@ -160,6 +160,17 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
         body.pose.p += foot.normal * std::min(0.5f * (sphere.radius - kToolLands - foot.gap), kFarthestOut);
         moved = true;
       }
+    // Jaws that stand over a wall which is too thick for them: the tool goes back along its shaft, toward its wider end.
+    float deepest = 0;
+    for (uint32_t i = 0; tool.hinge_z > 0 && moved && i < tool.sphere.size(); ++i) {
+      const BodySphere& sphere = tool.sphere[i];
+      if (sphere.jaw == 0 || sphere.radius <= kOverLands || (i < 64 && body.skip >> i & 1)) continue;
+      const Vec3 at = transform(body.pose, local(tool, sphere, body.opening));
+      const Foot foot = nearest_of_near(m, s, k.bodies, b, at, sphere.radius - kOverLands);
+      if (foot.patch != wall::kNone && foot.gap > 0) deepest = std::max(deepest, sphere.radius - kOverLands - foot.gap);
+    }
+    if (deepest > 0 && body.opening > kClosed)
+      body.pose.p += rotate(body.pose.q, {0, 0, 1}) * std::min(2 * deepest / body.opening, kFarthestOut);
   }
 }
 

@@ -11,6 +11,7 @@ namespace catgut::physical {
 // [m] of overlap that is left to the next step's contacts: of thread in the wall, of thread in a body, of a tool in the wall.
 constexpr float kThreadLands = 0.1e-3f, kOnBodyLands = 0.05e-3f, kToolLands = 0.15e-3f;
 constexpr float kBetweenLands = 0.2e-3f;  // [m] of thread in a jaw on its inner side
+constexpr float kOverLands = 0.25e-3f;    // [m] of a wall in jaws that stand over it
 constexpr float kFarthestOut = 0.5e-3f;   // [m] at once
 
 // Before what jaws hold is looked at.

@@ -147,7 +147,6 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
   uint32_t last_node = 0;
   constexpr float kApart = 0.01e-3f;  // [m]
   k.foot.clear();
-  uint32_t within = 0;  // of the node that is looked at
   const auto add = [&](uint32_t node, const Foot& foot, const thread::SoftContact* memory, bool may_share) {
     thread::SoftContact c;
     c.node = node, c.patch = foot.patch, c.normal = foot.normal, c.friction = m.surface_friction;
@@ -155,7 +154,6 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
       c.normal_impulse = memory->normal_impulse;
       c.friction_impulse = memory->friction_impulse, c.drift = memory->drift;
     }
-    c.within = within;
     // A contact that presses has a point of its own: its friction elsewhere would turn the wall without turning the thread.
     const bool touches = c.normal_impulse > 0 || foot.gap - r < kApart;
     if (may_share && !touches && shared > 0 && shared < 3 && last_node + 1 == node && !s.thread.broken[last_node] &&
@@ -196,7 +194,6 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
     const thread::SoftContact* memory = nullptr;  // the one that presses most
     for (size_t q = old; q < s.contact.size() && s.contact[q].node == i; ++q)
       if (!memory || s.contact[q].normal_impulse > memory->normal_impulse) memory = &s.contact[q];
-    within = memory ? memory->within : 1;
     const Vec3 p = s.thread.position(i);
     if (!memory && k.search.moved + static_cast<double>(distance(p, k.search.node_seen[i]) + 1.5f * h * k.search.speed) <
                        k.search.node_due[i])

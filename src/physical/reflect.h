@@ -18,7 +18,7 @@ constexpr void reflect(auto& a, Like<Eyelet> auto& e) {
 }
 constexpr void reflect(auto& a, Like<SoftContact> auto& c) {
   a(c.node), a(c.point), a(c.offset), a(c.patch), a(c.normal), a(c.friction), a(c.normal_impulse), a(c.friction_impulse);
-  a(c.drift), a(c.gap), a(c.within);
+  a(c.drift), a(c.gap);
 }
 constexpr void reflect(auto& a, Like<State> auto& s) {
   a(s.x), a(s.fine), a(s.v), a(s.warm), a(s.kept), a(s.rest), a(s.tension), a(s.broken), a(s.key), a(s.budget), a(s.crossing);

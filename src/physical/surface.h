@@ -81,7 +81,7 @@ struct NearestFoot {
     best = foot, front = in_front;
   }
   // At the corner of a pit a point may be in front of one face and yet inside. The sum of the normals, each times the angle of
-  // its patch there, tells (Baerentzen and Aanaes 2005, 10.1109/TVCG.2005.49).
+  // its patch there, decides (Baerentzen and Aanaes 2005, 10.1109/TVCG.2005.49).
   void settle_side(const wall::Model& model, const wall::State& state, const Surface& surface, Vec3 p);
 };
 

@@ -17,7 +17,7 @@ constexpr int kBitesPerThread = 10;
 constexpr float kRow = 0.004f;            // [m] between two rows of bites
 constexpr float kStaysApart = 0.012f;     // [m] round the bowel, between stay sutures
 constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
-constexpr float kPull = 2.2f;             // [N] on each strand of a physical throw: below what the bites bear
+constexpr float kPull = 2.6f;             // [N] on each strand of a physical throw: below what the bites bear
 // [N] the same for bites through half of the wall: both strands pull at each, and with 1.7 N one tore out.
 constexpr float kPullShallow = 0.9f;
 constexpr float kPullThrough = 1.7f;    // [N] of bites in and out through a whole wall

@@ -42,7 +42,7 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
                       (s.u.at(c.node) - s.soft_moved.at(c.point));
     const float gap = dot(c.normal, from) - 0.5f * settings.material.diameter;
     if (gap > kReady * settings.material.diameter || c.normal == Vec3{}) {
-      c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.gap = gap, c.within = 0;
+      c.normal_impulse = 0, c.friction_impulse = {}, c.drift = {}, c.gap = gap;
       continue;
     }
     Scratch::SoftActive a;
@@ -55,9 +55,9 @@ void begin_soft_contacts(const Settings& settings, State& state, Scratch& s, Sur
     // A node that was inside before the substep comes out at a limited speed.
     const float before = gap - dot(a.normal, motion(s, a)), target = std::min(0.0f, before + kPushOut * settings.substep);
     a.level = before - target, a.before = before;
-    // Thread in a bite that tore out lies within the wall, and both faces would push it out. What came from outside is held.
+    // Thread in a bite that tore out lies within the wall, and both faces would push it out.
     const float gentle = kDeepPress * settings.substep * settings.substep;
-    if (before < -kDeep && c.within != 0) a.most = gentle;
+    if (before < -kDeep && c.normal_impulse <= gentle) a.most = gentle;
     a.ln = c.normal_impulse, a.lt = four(tangential(c.friction_impulse, c.normal));
     s.soft_active.push_back(a);
   }
@@ -110,7 +110,6 @@ void end_soft_contacts(const Settings& settings, State&, Scratch& s, Surrounding
     const Vec3 went = three(motion(s, a)), moved = tangential(went, c.normal);
     if (a.ln > 0) s.touched[a.node] |= kOnOther;
     c.gap = dot(c.normal, went) + a.before;
-    if (c.gap > -kDeep) c.within = 0;
     c.normal_impulse = a.ln, c.friction_impulse = three(a.lt);
     c.drift = new_drift(settings, a, c.drift, moved);
   }

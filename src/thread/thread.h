@@ -193,8 +193,7 @@ struct SoftContact {
   float friction = 0.1f;
   float normal_impulse = 0;  // memory, as in Crossing; written by step
   Vec3 friction_impulse, drift;
-  float gap = 0;        // [m] at the end of the step; written by step
-  uint32_t within = 0;  // 1: the node was within the soft thing when it got this contact, and has not come out since
+  float gap = 0;  // [m] at the end of the step; written by step
 };
 // Finds the plane of a contact again for a node that has slid far within the step. `node`: where it is [m], in the soft thing
 // as it was at the beginning of the step. Writes the contact's normal, offset and patch, or leaves them.

@@ -20,8 +20,8 @@ float peak(const Measures& m, const std::string& name) {
   return found == m.force.end() ? -1 : found->peak_n;
 }
 
-// Nobody holds a tool.
-TickInput nobody() {
+// No hand holds a tool.
+TickInput no_hands() {
   TickInput input;
   for (ToolInput& hand : input.hand) hand.connected = 0;
   return input;
@@ -32,7 +32,7 @@ TEST(Measures, a_physical_scene_shows_its_thread_wall_and_forces) {
   const auto model = build_model(scene);
   const StatePtr state = initial_state(*model);
   Jobs jobs(1);
-  for (int i = 0; i < 30; ++i) step(*model, *state, nobody(), jobs);
+  for (int i = 0; i < 30; ++i) step(*model, *state, no_hands(), jobs);
   Measures m;
   m.stage_ms[0] = 3;
   measure(*model, *state, m);
