@@ -18,6 +18,7 @@ constexpr float kRow = 0.004f;            // [m] between two rows of bites
 constexpr float kStaysApart = 0.012f;     // [m] round the bowel, between stay sutures
 constexpr float kStitchesApart = 0.005f;  // [m] round the bowel
 constexpr float kPull = 2.6f;             // [N] on each strand of a physical throw: below what the bites bear
+constexpr float kPullRunning = 2.2f;      // [N] the same of a running suture, whose bites are drawn, too
 // [N] the same for bites through half of the wall: both strands pull at each, and with 1.7 N one tore out.
 constexpr float kPullShallow = 0.9f;
 constexpr float kPullThrough = 1.7f;    // [N] of bites in and out through a whole wall
@@ -326,6 +327,7 @@ Plan interrupted_plan(const PictureModel& picture, const SurgeonSkill& skill) {
 // to the far one, from which the forceps comes. Clamps hold the ends together while both ends of the thread are drawn.
 Plan over_and_over_plan(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan = interrupted_plan(picture, skill);
+  plan.pull = kPullRunning;
   plan.task.clear();
   const BitePlace middle = plan.place[0];
   plan.place.clear();
