@@ -133,8 +133,8 @@ inline Vec3 inner(const State& s, uint32_t c) { return vec3(s.motion.x[2 * c]) -
 void begin_step(const Model& model, State& state, Scratch& scratch, Jobs& jobs);
 // The second half: the speed limit, and positions.
 void finish_step(const Model& model, State& state, Jobs& jobs);
-// Impulses that stop columns from turning a face inside out (wall/volume): the last ones before finish_step, with the scratch
-// of begin_step. Forces alone do not bound what a thread can flatten.
+// Impulses that keep a tenth of each corner's volume (wall/volume), up to some 30 N on a column: the last ones before
+// finish_step, with the scratch of begin_step. Forces alone do not bound what a thread can flatten.
 void keep_volumes(const Model& model, State& state, const Scratch& scratch);
 
 // v += A^-1 p for impulses p (2 per column, [N s]), which may be the scratch's `external`.

@@ -96,7 +96,7 @@ TEST(Contact, a_point_is_inside_a_bent_wall_and_not_beside_it) {
 }
 
 // Four faces meet in a pit whose corner is a saddle: beside it a point may be in front of one of them and yet inside.
-TEST(Contact, the_sum_of_normals_tells_that_a_point_at_a_corner_is_inside) {
+TEST(Contact, the_sum_of_normals_says_that_a_point_at_a_corner_is_inside) {
   using namespace validation;
   const ContactBench bench(11, ContactBody::tube);
   const physical::Model& m = bench.model;
