@@ -34,23 +34,20 @@ struct Mover {
 
 // The part of a body that the thread sees as one cone, where it is now.
 struct Part {
-  uint32_t body = 0;
-  const BodySphere *from = nullptr, *to = nullptr;
+  float jaw = 0;         // of a sphere
   Vec3 a, z;             // [m]
   float ra = 0, rb = 0;  // [m]
 };
 Part part_of(const Model& m, const State& s, const BodiesScratch& k, uint32_t index) {
-  Part part;
-  part.body = k.tool_body[index];
-  const BodyModel& model = m.bodies.body[part.body];
-  const Body& body = s.bodies.body[part.body];
-  const auto first = std::find(k.tool_body.begin(), k.tool_body.end(), part.body) - k.tool_body.begin();
+  const uint32_t b = k.tool_body[index];
+  const BodyModel& model = m.bodies.body[b];
+  const Body& body = s.bodies.body[b];
+  const auto first = std::find(k.tool_body.begin(), k.tool_body.end(), b) - k.tool_body.begin();
   const BodyCapsule& capsule = model.thread_capsule[index - static_cast<size_t>(first)];
-  part.from = &model.sphere[capsule.a], part.to = &model.sphere[capsule.b];
-  part.a = transform(body.pose, local(model, *part.from, body.opening));
-  part.z = transform(body.pose, local(model, *part.to, body.opening));
-  part.ra = k.tool[index].radius, part.rb = part.ra + k.tool[index].widens;
-  return part;
+  const BodySphere &from = model.sphere[capsule.a], &to = model.sphere[capsule.b];
+  const float ra = k.tool[index].radius;
+  return {static_cast<float>(from.jaw), transform(body.pose, local(model, from, body.opening)),
+          transform(body.pose, local(model, to, body.opening)), ra, ra + k.tool[index].widens};
 }
 
 // Thread that a loose needle, or a tool that holds nothing, has hit otherwise than it was shown to (show_bodies). Jaws that
@@ -63,7 +60,7 @@ bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, u
   const bool still = b >= hands.targets.size() || std::abs(hands.targets[b].opening - body.opening) < kStill;
   const bool rigid = model.falls ? k.bodies.moving[b].loose : still && body.grip.what == Gripped::nothing;
   if (!rigid) return false;
-  const auto [owner, from, to, a, z, ra, rb] = part_of(m, s, k.bodies, index);
+  const auto [jaw, a, z, ra, rb] = part_of(m, s, k.bodies, index);
   const float r = 0.5f * m.thread.material.diameter;
   const Vec3 p = s.thread.position(node), q = s.thread.position(node + 1);
   const float reach = 0.5f * (distance(p, q) + distance(a, z)) + r + std::max(ra, rb);
@@ -72,7 +69,6 @@ bool put_apart(const Model& m, State& s, const Scratch& k, const Hands& hands, u
   nearest_of_segments(p, q, a, z, along, at);
   Vec3 apart = lerp(p, q, along) - lerp(a, z, at), normal = normalized(apart, side);
   if (dot(normal, side) < -0.3f) normal = -normal;
-  const float jaw = from->jaw;
   // Between closed jaws lies half of it in each. Where instruments pass through each other, a strand in both gives way.
   const bool between = jaw != 0 && dot(normal, rotate(body.pose.q, {-jaw, 0, 0})) > 0.3f;
   if (between && body.opening > kClosed && !m.bodies.pair_contact) return false;
