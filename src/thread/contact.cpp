@@ -122,7 +122,8 @@ void find_half_turns(const State& state, Scratch& s) {
 // magnitudes, on which friction acts, exceeds their vector sum N. A tension T that bears N turns by an angle 2 a with
 // sin a = N / (2 T), and its normal forces add up to 2 a T. Returns their ratio a / sin a, at most 1.5. The polygon's own angle
 // bounds a: a strand that is squeezed but straight does not turn. Here sin a of one strand; the larger one counts.
-float arc_sine(const State& state, const Scratch& s, uint32_t i, float normal_force) {
+// Inlined into its clones: SSE code that is called from AVX code waits for the upper halves of the registers.
+inline __attribute__((always_inline)) float arc_sine(const State& state, const Scratch& s, uint32_t i, float normal_force) {
   const float tension = state.tension[i];
   if (tension <= 0 || i == 0 || i + 1 == state.segments() || state.broken[i - 1] || state.broken[i + 1]) return 0;
   return std::min(s.half_turn[i], normal_force / (2 * tension));
