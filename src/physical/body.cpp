@@ -49,25 +49,6 @@ wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direc
   return w;
 }
 
-Foot outer_foot(const wall::Model& wm, const wall::State& ws, const Surface& surface, uint32_t patch, Vec3 p,
-                const Vec3* corner) {
-  Foot foot = nearest_on_patch(wm, ws, surface, patch, p, corner);
-  const int side = surface.patch[patch].side;
-  if (side == 0) return foot;
-  wall::Weights w = wall::weights(wm, ws.topology, foot.point), mid = w;
-  w.zeta = static_cast<float>(side), mid.zeta = 0;
-  if (dot(wall::place(w, ws.motion) - wall::place(mid, ws.motion), foot.facing) >= 0) return foot;
-  foot.facing = -foot.facing;
-  const Vec3 off = p - foot.at;
-  const float far = length(off), front = dot(off, foot.facing);
-  foot.normal = foot.facing, foot.gap = front;
-  if (foot.on_edge) {
-    foot.gap = front >= 0 ? far : -far;
-    if (front >= 0 && far > 1e-6f) foot.normal = off / far;
-  }
-  return foot;
-}
-
 BodyModel make_tool(const ToolShape& t) {
   BodyModel m;
   m.hinge_z = t.jaw_reach, m.mass = t.mass;
@@ -145,6 +126,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
   constexpr float kInside = 0.05e-3f;  // [m]
   constexpr float kAhead = 4e-3f;      // [m] by which lists of elements reach beyond what a step needs
   const float wall_speed = 1.0f;       // [m/s] of the wall, for the search alone
+  constexpr float kThrown = 0.8f;      // [m/s] of a loose needle that a tool or thread may throw in this step
   for (uint32_t b = 0; b < bodies.body.size(); ++b) {
     const BodyModel& m = model.body[b];
     Body& body = bodies.body[b];
@@ -200,8 +182,9 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       const Vec3 u = wall::velocity(w, ws.motion);
       // As far as it may come near in this step, however it turns.
       const auto nearing = [&](Vec3 v) { return 1.5f * std::max(0.0f, -dot(v, foot.normal)) + 0.3f * length(v); };
-      const float closing = h * std::max(nearing(point_speed(moving, r) + jaw_speed - u),
-                                         nearing(body.velocity + cross(body.spin, r) + jaw_speed - u));
+      const float closing =
+          h * std::max({nearing(point_speed(moving, r) + jaw_speed - u),
+                        nearing(body.velocity + cross(body.spin, r) + jaw_speed - u), moving.loose ? kThrown : 0});
       if (gap > model.reach + closing) return;
       const float least = gap - closing;  // at the end of the step
       // The same plane from two patches that meet there is one contact. Of a sphere no more than twelve, those that come
@@ -269,7 +252,7 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
           if (least_distance(wm, ws, surface, search, box, q, p) > useful || least_of_part(surface, search, q, p) > useful)
             continue;
-          const Foot foot = outer_foot(wm, ws, surface, q, p, corners_in(search, q));
+          const Foot foot = nearest_on_patch(wm, ws, surface, q, p, corners_in(search, q));
           if (foot.gap - s.radius > margin || (foot.on_edge && foot.gap < 0)) continue;
           add(i, foot, p, s.radius, jaw_speed, kSphereRow, inside, s.jaw);
         }

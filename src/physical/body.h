@@ -96,6 +96,7 @@ struct Body {
   uint64_t skip = 0;
   Grip grip;
   Vec3 thread_force, thread_torque;  // [N], [N m] about the center, of the thread in the last step
+  float drag = 0, turn_drag = 0;     // [N s/m], [N m s/rad] of thread that presses the body (feel_thread), in the last step
   // Results of the last step: of wall, thread and other bodies on this one, torque about the center; of the hand on it.
   Vec3 force, torque, hand_force, hand_torque;
 };
@@ -209,10 +210,6 @@ struct BodiesScratch {
 // Where a load in `direction` (unit) acts on the wall at w. A load along the director moves the column as a whole: the
 // thickness has a penalty in place of a law, and 4 N on one face of a column turned it inside out.
 wall::Weights load_point(wall::Weights w, const wall::Motion& motion, Vec3 direction);
-// As nearest_on_patch, for a sphere outside the wall: where a face is folded so sharply that its corners turn over, the
-// directors say which side is out.
-Foot outer_foot(const wall::Model& model, const wall::State& state, const Surface& surface, uint32_t patch, Vec3 p,
-                const Vec3* corner = nullptr);
 // Positions.
 Vec3 local(const BodyModel& model, const BodySphere& sphere, float opening);  // [m] body frame
 inline Vec3 center_of(const BodyModel& model, const Body& body) { return transform(body.pose, model.center); }

@@ -67,9 +67,11 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
   out.v = (b.velocity * m.mass + (w.away * m.stiffness + w.speed * damping) * h + push) / mass;
   const Vec3 force = (w.away - out.v * h) * m.stiffness + (w.speed - out.v) * damping;
   if (length2(force) > m.max_force * m.max_force) {
-    // A hand at its strongest: constant force, no stiffness; it still damps the motion.
+    // A hand at its strongest: constant force, no stiffness. Its damping and the thread's drag are inertia only: what has
+    // become more since the last step was at rest, or the tool would press with more than the hand.
     out.inv_mass = 1 / (m.mass + h * damping);
-    out.v = (b.velocity * (m.mass + h * damping) + normalized(force) * (m.max_force * h) + push) * out.inv_mass;
+    const float moving = m.mass + h * std::min(damping, m.damping + b.drag);
+    out.v = (b.velocity * moving + normalized(force) * (m.max_force * h) + push) * out.inv_mass;
   }
   const float inertia = m.inertia + h * turn_damping + h * h * m.turn_stiffness;
   out.inv_inertia = 1 / inertia;
@@ -77,7 +79,8 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
   const Vec3 torque = (w.turn - out.w * h) * m.turn_stiffness + (w.spin - out.w) * turn_damping;
   if (length2(torque) > m.max_torque * m.max_torque) {
     out.inv_inertia = 1 / (m.inertia + h * turn_damping);
-    out.w = (b.spin * (m.inertia + h * turn_damping) + normalized(torque) * (m.max_torque * h) + twist) * out.inv_inertia;
+    const float turning = m.inertia + h * std::min(turn_damping, m.turn_damping + b.turn_drag);
+    out.w = (b.spin * turning + normalized(torque) * (m.max_torque * h) + twist) * out.inv_inertia;
   }
 }
 
@@ -97,6 +100,7 @@ bool is_on(const thread::Plane* drape, const BodyModel& model, const Body& body)
 void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::State& thread, const thread::Plane* drape,
                  float substep, float h, BodiesScratch& k) {
   constexpr float kGive = 20e-6f;  // [m] by which a tool moves off thread that presses it, until the thread is slack
+  constexpr float kFades = 0.9f;   // in a step: loads that come and go would brake a tool
   k.moving.resize(bodies.body.size());
   for (size_t b = 0; b < bodies.body.size(); ++b) {
     BodiesScratch::Moving& m = k.moving[b];
@@ -135,7 +139,11 @@ void feel_thread(const BodiesModel& model, const Bodies& bodies, const thread::S
   }
   for (size_t b = 0; b < bodies.body.size(); ++b) {
     BodiesScratch::Moving& m = k.moving[b];
-    if (!model.body[b].falls) continue;
+    if (!model.body[b].falls) {
+      m.drag = std::max(m.drag, kFades * bodies.body[b].drag);
+      m.turn_drag = std::max(m.turn_drag, kFades * bodies.body[b].turn_drag);
+      continue;
+    }
     if (m.fast) {
       m.drag = m.turn_drag = 0;
       continue;
@@ -529,6 +537,7 @@ void solve_bodies(const BodiesModel& model, const wall::Model& wm, wall::State& 
       body.target_place = transform(target[b].pose, m.center), body.target_turn = target[b].pose.q;
     }
     body.held = moving.held;
+    body.drag = moving.drag, body.turn_drag = moving.turn_drag;
     body.velocity = slow.v, body.spin = slow.w, body.opening = moving.opening;
     body.pose.q = turned(body.pose.q, moving.w * h);
     body.pose.p = moving.center + moving.v * h - rotate(body.pose.q, m.center);

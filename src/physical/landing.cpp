@@ -115,6 +115,27 @@ void put_off_wall(const Model& m, State& s, const Scratch& k, uint32_t node, Vec
   if (nearest.shared > 0 && out > 0 && best.gap > -deepest) mover.move(node, best.normal * std::min(out, kFarthestOut));
 }
 
+// A node that was put off one side of a fold, `from` where it was before: it slides along that side, out of the fold, as far as
+// the other side asks for, in front of which it was.
+void keep_before_other_side(const Model& m, State& s, const Scratch& k, uint32_t node, Vec3 from, Mover& mover) {
+  constexpr float kSharpest = -0.9f;  // cosine between the normals: from a closed fold it cannot slide
+  const Vec3 to = s.thread.position(node), off = normalized(to - from);
+  const Surface& surface = surface_of(m, s);
+  const float r = 0.5f * m.thread.material.diameter;
+  NearestFoot nearest;
+  nearest.best.gap = 1e-3f;
+  for (uint32_t f = k.search.node_first[node]; f < k.search.node_first[node + 1]; ++f)
+    for (uint32_t q = surface.first_of_face[k.search.node_face[f]]; q < surface.first_of_face[k.search.node_face[f] + 1]; ++q) {
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, to);
+      if (dot(foot.facing, off) > -0.2f || dot(from - foot.at, foot.facing) < 0) continue;
+      nearest.offer(foot, to);
+    }
+  const Foot& other = nearest.best;
+  const float along = dot(other.facing, off), out = r - other.gap - kThreadLands;
+  if (nearest.shared > 0 && out > 0 && along > kSharpest)
+    mover.move(node, clamped((other.facing - along * off) * (out / (1 - along * along)), kFarthestOut));
+}
+
 // The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
 Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uint32_t body, Vec3 p, float reach) {
   const Surface& surface = surface_of(m, s);
@@ -126,7 +147,7 @@ Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uin
     const float ball = k.face_radius[f] + reach + kMoved;
     if (length2(k.face_center[f] - p) > ball * ball) continue;
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
-      const Foot foot = outer_foot(m.wall, s.wall, surface, q, p);
+      const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
       const float d = distance(foot.at, p);
       // At an edge, of the patch that the sphere is in front of.
       const bool same = best.patch != wall::kNone && d < far + 1e-7f;
@@ -208,6 +229,7 @@ void put_thread_out(const Model& m, State& s, Scratch& k, const Hands& hands) {
   // The wall that has come farther toward a node than the thread's step foresaw, or to which a tool has moved the node.
   const auto put_all_off_wall = [&] {
     for (const thread::SoftContact& c : k.contact) {
+      const Vec3 from = t.position(c.node);
       const Vec3 beside = k.coupling.now(c.point, s.wall) - (k.coupling.at[c.point] + k.moved[c.point]) - k.put[c.node];
       const float nearer = dot(beside, c.normal), out = std::min(nearer, nearer - c.gap - kThreadLands);
       if (out > 0) mover.move(c.node, c.normal * std::min(out, kFarthestOut));
@@ -218,6 +240,7 @@ void put_thread_out(const Model& m, State& s, Scratch& k, const Hands& hands) {
       if (beside2 > kBeside * kBeside || went2 > kSlid * kSlid ||
           ((beside2 > kRests * kRests || went2 > kRests * kRests) && in_its_patch()))
         put_off_wall(m, s, k, c.node, c.normal, mover);
+      if (length2(t.position(c.node) - from) > kBeside * kBeside) keep_before_other_side(m, s, k, c.node, from, mover);
     }
     for (uint32_t i = 0, at = 0; mover.moved > 0 && i < t.nodes(); ++i) {
       while (at < k.contact.size() && k.contact[at].node < i) ++at;

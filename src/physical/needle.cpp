@@ -39,7 +39,7 @@ Foot nearest_face(const wall::Model& wm, const wall::State& ws, const Surface& s
     const float r = k.face_radius[f] + within;
     if (length2(k.face_center[f] - p) > r * r) continue;
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
-      const Foot foot = outer_foot(wm, ws, surface, q, p);
+      const Foot foot = nearest_on_patch(wm, ws, surface, q, p);
       if ((foot.on_edge && foot.gap < 0) || foot.gap < -0.35f * wm.laminate.thickness) continue;
       if (length2(against) > 0 && -dot(against, foot.facing) < least_slope) continue;
       const float far = std::abs(foot.gap), front = dot(normalized(p - foot.at), foot.facing);

@@ -281,7 +281,14 @@ void find_contacts(const Model& m, const State& s, Scratch& k, uint32_t& dropped
           const bool meet = length2(between) < kSame * kSame && !sharp;
           const bool fold = foot.gap <= 0 && foot.gap > -d && memory && dot(between, best.facing) > -kSame &&
                             dot(between, foot.facing) < kSame && (!foot.on_edge || meet);
-          if (((foot.gap > 0 && !foot.on_edge) || fold) && foot.gap < other->gap && !like(foot.facing)) *other = foot;
+          // A sharp edge of the other side of a fold, to which the node was pressed.
+          const bool sharp_edge = foot.gap > 0 && foot.on_edge && dot(foot.facing, best.facing) < 0.3f &&
+                                  dot(between, best.facing) > kSame && dot(between, foot.normal) < -kSame;
+          const thread::SoftContact* before = sharp_edge ? memory_of(foot.normal) : nullptr;
+          const bool edge = before && before->normal_impulse > 0;
+          if (((foot.gap > 0 && !foot.on_edge) || fold || edge) && foot.gap < other->gap &&
+              !like(edge ? foot.normal : foot.facing))
+            *other = foot;
         }
       }
       if (other->gap >= r + far_move) break;
@@ -312,6 +319,7 @@ void find_again(void* context, std::span<thread::SoftContact> contacts, size_t i
       if (has(i)) return true;
     return false;
   };
+  constexpr float kInFront = 0.7f;  // cosine: in a pit, but not round a sharp edge there
   NearestFoot nearest;
   nearest.offer(nearest_on_patch(slid.m.wall, slid.s.wall, surface, c.patch, node), node);
   const Foot& best = nearest.best;
@@ -342,7 +350,8 @@ void find_again(void* context, std::span<thread::SoftContact> contacts, size_t i
     }
     nearest.settle_side(slid.m.wall, slid.s.wall, surface, node);
   }
-  c.offset = best.at - slid.k.coupling.at[c.point], c.normal = in_pit ? best.facing : best.normal, c.patch = best.patch;
+  c.offset = best.at - slid.k.coupling.at[c.point], c.normal = in_pit && nearest.front > kInFront ? best.facing : best.normal;
+  c.patch = best.patch;
 }
 
 void begin_bodies(const Model& m, State& s, Scratch& k, const Hands& hands) {

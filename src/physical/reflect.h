@@ -41,8 +41,8 @@ constexpr void reflect(auto& a, Like<Grip> auto& g) {
 }
 constexpr void reflect(auto& a, Like<Body> auto& b) {
   a(b.pose), a(b.velocity), a(b.spin), a(b.opening), a(b.shown), a(b.shown_opening), a(b.target_place), a(b.target_turn);
-  a(b.held), a(b.skip), a(b.grip), a(b.thread_force), a(b.thread_torque), a(b.force), a(b.torque), a(b.hand_force);
-  a(b.hand_torque);
+  a(b.held), a(b.skip), a(b.grip), a(b.thread_force), a(b.thread_torque), a(b.drag), a(b.turn_drag), a(b.force), a(b.torque);
+  a(b.hand_force), a(b.hand_torque);
 }
 constexpr void reflect(auto& a, Like<RowMemory> auto& m) { a(m.key), a(m.axis), a(m.impulse); }
 constexpr void reflect(auto& a, Like<Bodies> auto& b) { a(b.body), a(b.memory), a(b.overflow); }

@@ -166,22 +166,6 @@ std::array<Vec3, 4> part_corners(const wall::State& s, const Corners& c, const P
   return b;
 }
 
-// Nearest point of a patch, in its coordinates. Begins with the foot on a parallelogram.
-void nearest(const wall::Patch& patch, Vec3 target, float& xi, float& eta) {
-  xi = eta = patch.quad ? 0.0f : 0.6f;
-  for (int i = 0; i < 5; ++i) {
-    const Vec3 a = patch.along_xi(eta), b = patch.along_eta(xi), r = target - patch.at(xi, eta);
-    const float aa = dot(a, a), bb = dot(b, b), ab = dot(a, b), det = aa * bb - ab * ab;
-    if (!(det > 1e-12f * aa * bb)) return;
-    const float low = patch.quad ? -1.0f : 0.0f, high = patch.quad ? 1.0f : 2.0f, x0 = xi, y0 = eta;
-    xi = std::clamp(xi + (bb * dot(r, a) - ab * dot(r, b)) / det, low, high);
-    eta = std::clamp(eta + (dot(r, b) - ab * (xi - x0)) / bb, low, high);
-    if (!patch.quad) eta = std::min(eta, 2 - xi);
-    xi = std::clamp(x0 + (dot(r, a) - ab * (eta - y0)) / aa, low, patch.quad ? high : 2 - eta);
-    if (std::abs(xi - x0) + std::abs(eta - y0) < 1e-4f) return;
-  }
-}
-
 }  // namespace
 
 Surface make_surface(const wall::Model& m, const wall::State& s) {
@@ -305,10 +289,12 @@ Foot nearest_on_patch(const wall::Model& m, const wall::State& s, const Surface&
   const Corners c = corners_of(m, s.topology, patch.face);
   const wall::Patch b = patch_corners(s, c, patch, corner);
   float xi = 0, eta = 0;
-  nearest(b, p, xi, eta);
+  wall::nearest(b, p, xi, eta);
   Foot foot;
   foot.patch = index;
   foot.facing = cross(b.along_xi(eta), b.along_eta(xi));
+  // In a crease a corner of a patch may turn over: the rest of the patch says which side is out.
+  if (const Vec3 mean = cross(b.p[2] - b.p[0], b.p[3] - b.p[1]); b.quad && dot(foot.facing, mean) < 0) foot.facing = mean;
   if (patch.side != 0) foot.facing = foot.facing * static_cast<float>(patch.side);
   foot.on_edge = b.quad ? std::max(std::abs(xi), std::abs(eta)) > 0.9999f : std::min({xi, eta, 2 - xi - eta}) < 1e-4f;
   if (patch.part) {

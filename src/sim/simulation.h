@@ -45,7 +45,7 @@ PictureModel picture_model(const Model& model);
 
 // Saves the whole state as bytes (versioned by kStateVersion) and restores it. load_state throws InputError if the bytes do not
 // fit the model.
-constexpr uint32_t kStateVersion = 18;
+constexpr uint32_t kStateVersion = 19;
 std::vector<std::byte> save_state(const Model& model, const State& state);
 void load_state(const Model& model, State& state, const std::vector<std::byte>& bytes);
 uint64_t hash_state(const Model& model, const State& state);

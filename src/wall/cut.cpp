@@ -195,6 +195,7 @@ void install(const Model& m, Layout&& l, Topology& t, Motion* motion) {
 void make_room(const State& s, Scratch& k) {
   for (Column<Float4>* list : {&k.y, &k.force, &k.external, &k.answer}) list->resize(s.motion.x.size());
   k.block_force.resize(s.topology.corners.size());
+  k.flat_corner.reserve(4 * kLanesOfBlock * k.block_force.size());
 }
 
 }  // namespace

@@ -21,4 +21,7 @@ struct Patch {
   }
 };
 
+// The place on a patch that is nearest to a point, in its coordinates.
+void nearest(const Patch& patch, Vec3 target, float& xi, float& eta);
+
 }  // namespace catgut::wall

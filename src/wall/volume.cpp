@@ -3,6 +3,7 @@
 // impulses keep the wall's momentum and do not rebound.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "wall/wall.h"
 
@@ -12,12 +13,9 @@ namespace {
 constexpr float kLeast = 0.1f;       // of the volume at rest
 constexpr float kRecovers = 0.1f;    // of what is missing of that, in a step
 constexpr float kFlatAtRest = 0.3f;  // of the mean corner: one below that at rest is left as it is
-constexpr int kRounds = 4;           // over corners that share columns
-
-struct Corner {
-  uint32_t at = 0, next = 0, last = 0;  // columns
-  float least = 0;                      // [m^3]
-};
+constexpr int kRounds = 60;          // over corners that share columns
+constexpr float kTurns = 0.3f;       // of a director's length, in a step
+constexpr float kFast = 0.25f;       // [m/s] of a column: then its corners may lose all of their volume in a step
 
 // [m^3] that the edges and the director of a corner span at rest.
 float rest_volume(const ElementBlock& block, uint32_t lane, bool quad, size_t k, float& middle) {
@@ -32,7 +30,7 @@ float rest_volume(const ElementBlock& block, uint32_t lane, bool quad, size_t k,
 }
 
 // True: an impulse was needed.
-bool stop(const Topology& t, Motion& motion, const Corner& c, float h) {
+bool stop(const Topology& t, Motion& motion, const FlatCorner& c, float h) {
   const uint32_t index[] = {2 * c.at, 2 * c.next, 2 * c.last, 2 * c.at + 1};
   Vec3 from[4], to[4];
   for (size_t i = 0; i < 4; ++i) from[i] = vec3(motion.x[index[i]]), to[i] = from[i] + vec3(motion.v[index[i]]) * h;
@@ -57,34 +55,47 @@ bool stop(const Topology& t, Motion& motion, const Corner& c, float h) {
 
 }  // namespace
 
-void keep_volumes(const Model& m, State& s, const Scratch& k) {
+void keep_volumes(const Model& m, State& s, Scratch& k) {
   const uint32_t wholes = static_cast<uint32_t>(m.block.size());
-  for (int round = 0; round < kRounds; ++round) {
-    bool moved = false;
-    for (uint32_t b = 0; b < s.topology.corners.size(); ++b) {
-      if (!k.block_force[b].flat) continue;
-      const ElementBlock& block = b < wholes ? m.block[b] : s.topology.extra[b - wholes];
-      const BlockCorners& corners = s.topology.corners[b];
-      const bool quad = corners.quads != 0;
-      const size_t n = quad ? 4 : 3;
-      for (uint32_t lane = 0; lane < kLanesOfBlock; ++lane) {
-        // The lane of a face that is divided is idle.
-        if (const uint32_t face = b < wholes ? m.face_of_lane[b * kLanesOfBlock + lane] : kNone;
-            face != kNone && fragments(s.topology, face) > 0)
-          continue;
-        for (size_t i = 0; i < n; ++i) {
-          float middle = 0;
-          const float rest = rest_volume(block, lane, quad, i, middle);
-          if (rest <= kFlatAtRest * middle) continue;
-          moved |= stop(s.topology, s.motion,
-                        {corners.column[i][lane], corners.column[(i + 1) % n][lane], corners.column[(i + n - 1) % n][lane],
-                         kLeast * rest},
-                        m.step);
-        }
+  const auto is_fast = [&](uint32_t column) {
+    const Float4* v = &s.motion.v[2 * column];
+    return std::max(length2(vec3(v[0])), length2(vec3(v[1]))) > kFast * kFast;
+  };
+  bool any_fast = false;
+  for (uint32_t c = 0; c < columns(s) && !any_fast; ++c) any_fast = is_fast(c);
+  k.flat_corner.clear();
+  for (uint32_t b = 0; b < s.topology.corners.size(); ++b) {
+    if (!k.block_force[b].flat && !any_fast) continue;
+    const ElementBlock& block = b < wholes ? m.block[b] : s.topology.extra[b - wholes];
+    const BlockCorners& corners = s.topology.corners[b];
+    const bool quad = corners.quads != 0;
+    const size_t n = quad ? 4 : 3;
+    for (uint32_t lane = 0; lane < kLanesOfBlock; ++lane) {
+      // The lane of a face that is divided is idle.
+      if (const uint32_t face = b < wholes ? m.face_of_lane[b * kLanesOfBlock + lane] : kNone;
+          face != kNone && fragments(s.topology, face) > 0)
+        continue;
+      bool fast = false;
+      for (size_t i = 0; i < n && any_fast; ++i) fast = fast || is_fast(corners.column[i][lane]);
+      if (!k.block_force[b].flat && !fast) continue;
+      for (size_t i = 0; i < n; ++i) {
+        float middle = 0;
+        const float rest = rest_volume(block, lane, quad, i, middle);
+        if (rest <= kFlatAtRest * middle) continue;
+        k.flat_corner.push_back(
+            {corners.column[i][lane], corners.column[(i + 1) % n][lane], corners.column[(i + n - 1) % n][lane], kLeast * rest});
       }
     }
-    if (!moved) return;
   }
+  // What turns or stretches a director farther than that in one step is beyond the derivatives below.
+  for (const FlatCorner& c : k.flat_corner) {
+    Float4& v = s.motion.v[2 * c.at + 1];
+    const float most = kTurns * length(vec3(s.motion.x[2 * c.at + 1])) / m.step, speed = length(vec3(v));
+    if (speed > most) v = float4(vec3(v) * (most / speed));
+  }
+  bool moved = true;
+  for (int round = 0; round < kRounds && std::exchange(moved, false); ++round)
+    for (const FlatCorner& c : k.flat_corner) moved |= stop(s.topology, s.motion, c, m.step);
 }
 
 }  // namespace catgut::wall

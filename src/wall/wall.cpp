@@ -252,6 +252,7 @@ Scratch make_scratch(const Model&, const State& state) {
   for (Column<Float4>* c : {&k.y, &k.force, &k.external, &k.answer}) c->reserve(room), c->resize(n);
   k.rhs.resize(state.topology.factor.size);
   k.block_force.resize(state.topology.corners.size());
+  k.flat_corner.reserve(4 * kLanesOfBlock * (k.block_force.size() * 4 / 3 + 4));
   return k;
 }
 

@@ -107,11 +107,18 @@ struct State {
   Motion motion;
 };
 
+// Corner of an element that may lose its volume in this step.
+struct FlatCorner {
+  uint32_t at = 0, next = 0, last = 0;  // columns
+  float least = 0;                      // [m^3]
+};
+
 // Workspace: nothing in it persists between steps.
 struct Scratch {
   Column<Float4> y, force, external, answer;
   Column<Float4> rhs;
   std::vector<BlockForce> block_force;
+  std::vector<FlatCorner> flat_corner;
 };
 
 struct Wall {
@@ -133,9 +140,9 @@ inline Vec3 inner(const State& s, uint32_t c) { return vec3(s.motion.x[2 * c]) -
 void begin_step(const Model& model, State& state, Scratch& scratch, Jobs& jobs);
 // The second half: the speed limit, and positions.
 void finish_step(const Model& model, State& state, Jobs& jobs);
-// Impulses that keep a tenth of each corner's volume (wall/volume), up to some 30 N on a column: the last ones before
-// finish_step, with the scratch of begin_step. Forces alone do not bound what a thread can flatten.
-void keep_volumes(const Model& model, State& state, const Scratch& scratch);
+// Impulses that keep a tenth of each corner's volume (wall/volume): the last ones before finish_step, with the scratch of
+// begin_step. Forces alone do not bound what a thread can flatten.
+void keep_volumes(const Model& model, State& state, Scratch& scratch);
 
 // v += A^-1 p for impulses p (2 per column, [N s]), which may be the scratch's `external`.
 void apply_impulses(State& state, Scratch& scratch, const Column<Float4>& impulse);

@@ -6,9 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <vector>
 
+#include "core/random.h"
 #include "validation/suture_scenes.h"
 
 namespace catgut::physical {
@@ -55,6 +57,61 @@ Vec3 momentum(const Sewn& s) {
   for (uint32_t c = 0; c < wall::columns(s.state.wall); ++c)
     p += wall::vec3(s.state.wall.motion.v[2 * c]) * s.state.wall.topology.mass[c];
   return p;
+}
+
+// Each patch of a crumpled sheet against a grid of points on it: of quads, which are twisted, and of triangles. Newton's steps
+// alone missed the nearest place by up to 1.2 and 2.6 mm, and tools and thread went in there.
+TEST(Surface, the_nearest_place_on_a_crumpled_patch_is_found) {
+  Random random(3);
+  const auto wobble = [&](float most) {
+    return Vec3{2 * random.uniform() - 1, 2 * random.uniform() - 1, 2 * random.uniform() - 1} * most;
+  };
+  for (const bool quads : {true, false}) {
+    wall::SheetShape shape;
+    shape.width = shape.height = 0.0125f, shape.columns = shape.rows = 6;
+    wall::Spec spec;
+    spec.mesh = wall::sheet(shape);
+    if (!quads) {
+      std::vector<std::array<uint32_t, 4>> half;
+      for (const auto& f : spec.mesh.face)
+        half.push_back({f[0], f[1], f[2], wall::kNone}), half.push_back({f[0], f[2], f[3], wall::kNone});
+      spec.mesh.face = half;
+      spec.mesh.along.assign(half.size(), {1, 0, 0});
+    }
+    const wall::Wall w = wall::build_wall(spec);
+    wall::State crumpled = w.state;
+    for (size_t i = 0; i < crumpled.motion.x.size(); ++i)
+      crumpled.motion.x[i] = wall::float4(wall::vec3(crumpled.motion.x[i]) + wobble(i % 2 == 0 ? 1e-3f : 0.8e-3f));
+    const Surface surface = make_surface(w.model, crumpled);
+    const auto corners = [&](const Patch& patch) {
+      const auto& f = w.model.mesh.face[patch.face];
+      const auto at = [&](size_t k, int side) {
+        const uint32_t column = f[k % (quads ? 4 : 3)];
+        return side > 0 ? wall::outer(crumpled, column) : wall::inner(crumpled, column);
+      };
+      if (patch.side != 0)
+        return std::array{at(0, patch.side), at(1, patch.side), at(2, patch.side), quads ? at(3, patch.side) : Vec3{}};
+      return std::array{at(patch.edge, -1), at(patch.edge + 1, -1), at(patch.edge + 1, 1), at(patch.edge, 1)};
+    };
+    float worst = 0;
+    for (int i = 0; i < 40; ++i) {
+      const Vec3 p = Vec3{0.006f, 0.006f, 0} + wobble(4e-3f);
+      for (uint32_t q = 0; q < surface.patch.size(); ++q) {
+        const auto c = corners(surface.patch[q]);
+        const bool triangle = !quads && surface.patch[q].side != 0;
+        float least = 1;
+        for (int a = 0; a <= 60; ++a)
+          for (int b = 0; b <= (triangle ? 60 - a : 60); ++b) {
+            const float x = static_cast<float>(a) / 60, y = static_cast<float>(b) / 60;
+            const Vec3 at =
+                triangle ? c[0] * (1 - x - y) + c[1] * x + c[2] * y : lerp(lerp(c[0], c[1], x), lerp(c[3], c[2], x), y);
+            least = std::min(least, distance(at, p));
+          }
+        worst = std::max(worst, distance(nearest_on_patch(w.model, crumpled, surface, q, p).at, p) - least);
+      }
+    }
+    EXPECT_LT(worst, 0.02e-3f) << (quads ? "quads" : "triangles");
+  }
 }
 
 TEST(Physical, what_the_thread_does_to_the_wall_the_wall_does_to_the_thread) {

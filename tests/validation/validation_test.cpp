@@ -37,6 +37,11 @@ TEST(Contact, nothing_sinks_in_where_it_did_before) {
                            {ContactBody::ends, {473}},
                            {ContactBody::pads, {118, 170, 216, 556, 873, 1449}},
                            {ContactBody::pads, {351}, 12},
+                           {ContactBody::pads, {58, 64}, 16},
+                           {ContactBody::pads, {180, 232, 318}, 17},
+                           {ContactBody::pads, {161, 169, 482}, 18},
+                           {ContactBody::pads, {134}, 20},
+                           {ContactBody::pads, {34}, 24},
                            {ContactBody::tubes, {488, 1395}},
                            {ContactBody::bowel, {336}}};
   for (const auto& [body, numbers, seed] : events) {
