@@ -12,7 +12,7 @@ std::array<KnotKind, 4> knot_kinds() {
   return {{{"single throw", "knot_single", validation::single_throw(), {{1}}, 15},
            {"granny", "knot_granny", validation::granny(), {{1}, {1, false}}, 17},
            {"square", "knot_square", validation::square(), {{1}, {1}}, 14},
-           {"surgeon's 2-1-1", "knot_surgeons", validation::surgeons_211(), {{2}, {1}, {1}}, 18}}};
+           {"surgeon's 2-1-1", "knot_surgeons", validation::surgeons_211(), {{2}, {1}, {1}}, 14}}};
 }
 
 void add_thread(std::vector<DrawnCapsule>& to, const thread::State& s, uint32_t middle, float radius) {

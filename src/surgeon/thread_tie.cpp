@@ -106,7 +106,7 @@ std::string ThreadTie::doing() const {
   return kName[stage_];
 }
 
-float ThreadTie::held_tail() const { return tail_ - kTailEnd - kNearer * static_cast<float>(misses_); }
+float ThreadTie::held_tail() const { return tail_ - taken_; }
 
 void ThreadTie::again(const Snapshot& seen, Stage after) {
   ++retries_, misses_ = 0;
@@ -269,6 +269,7 @@ void ThreadTie::go(const Snapshot& seen, Stage stage) {
       approach_ = how_.flat    ? normalized(Vec3{side_, kSteepOnFlat, 0})
                   : how_.lumen ? clear(ways_into_lumen(side_, goal.z - origin_.z))
                                : clear(ways_to_tail(side_, wall_normal(picture_, seen, goal)));
+      taken_ = grasp_place(seen);
       break;
     }
     case draw: {
@@ -398,7 +399,7 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       break;
     case fetch: {
       // By sight of the jaws, which lag behind the hand.
-      const float place = tail_place(seen, kTailEnd + kNearer * static_cast<float>(misses_));
+      const float place = tail_place(seen, taken_);
       // Not down before the shaft stands as it shall: a jaw would meet the wall, and the tail in a lumen has walls beside it.
       const bool stands = dot(shaft_, approach_) > kStands;
       const Vec3 goal = tail_node(seen, place) + (stands ? Vec3{} : approach_ * kAbove) + shaft_ * risen_,
@@ -410,7 +411,10 @@ bool ThreadTie::operate(const Snapshot& seen, float dt) {
       // A jaw that stands on the wall beside the tail would plough both away: up once, and down again nearer to the knot.
       if (risen_ > 0 && left < kNearlyThere) risen_ = 0;
       caught_ = risen_ == 0 && length(seen.tool[kHolder].force) > kStandsOn ? caught_ + dt : 0;
-      if (caught_ > kCaughtFor && left > kBetweenJaws && misses_ == 0) ++misses_, risen_ = kRises, waited_ = caught_ = 0;
+      if (caught_ > kCaughtFor && left > kBetweenJaws && misses_ == 0) {
+        ++misses_, risen_ = kRises, waited_ = caught_ = 0;
+        taken_ = grasp_place(seen);
+      }
       // Steeper, and turned until the tail passes between the jaws.
       shaft_ = normalized(lerp(shaft_, approach_, std::min(1.0f, kTurns * dt)));
       const Vec3 along = tail_node(seen, place + kBeside) - tail_node(seen, place - kBeside);

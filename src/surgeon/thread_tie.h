@@ -80,6 +80,7 @@ class ThreadTie {
   float slack_of(const Snapshot& seen, bool tail) const;
   Vec3 tail_node(const Snapshot& seen, float from_end) const;
   float tail_place(const Snapshot& seen, float wanted) const;
+  float grasp_place(const Snapshot& seen) const;
   float held_tail() const;  // [m] of it from the jaws to the knot
   // Winds again, after the stage that lets everything go; or fails.
   void again(const Snapshot& seen, Stage after);
@@ -95,6 +96,7 @@ class ThreadTie {
   ThreadTieSettings how_;
   Vec3 line_;  // unit: from the strand's hand to the tail's, where side_ is +1
   Stage stage_ = done;
+  float taken_ = 0;  // [m] from the tail's end, where the needle holder takes it
   int wraps_ = 1, misses_ = 0, retries_ = 0, tries_ = 0, throws_ = 0;
   float side_ = 1, sense_ = 1, waited_ = 0;
   int wanted_ = 0;  // throws that the knot shall have

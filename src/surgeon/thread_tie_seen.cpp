@@ -53,6 +53,17 @@ float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
   return best;
 }
 
+// [m] from the tail's end, where the needle holder takes it next. After a miss where the tail lies highest: in the groove
+// between two walls the jaws would stand on both and not reach it.
+float ThreadTie::grasp_place(const Snapshot& seen) const {
+  if (misses_ == 0) return kTailEnd;
+  constexpr float kNearest = 3e-3f;  // [m] from the end
+  float best = kTailEnd, highest = -1;
+  for (float at = kNearest; at < kTailEnd + kFarthest && at < tail_ - kKnot; at += 1e-3f)
+    if (const float high = dot(tail_node(seen, at), approach_); high > highest) best = at, highest = high;
+  return best;
+}
+
 // [rad] of the strand round jaws and shaft of the needle holder, in the sense of the throw. What has slid past the tips does
 // not count.
 float ThreadTie::wound(const Snapshot& seen) const {
