@@ -53,10 +53,10 @@ float ThreadTie::tail_place(const Snapshot& seen, float wanted) const {
   return best;
 }
 
-// [m] from the tail's end, where the needle holder takes it next. After a miss where the tail lies highest: in the groove
+// [m] from the tail's end, where the needle holder takes it next. After two misses where the tail lies highest: in the groove
 // between two walls the jaws would stand on both and not reach it.
 float ThreadTie::grasp_place(const Snapshot& seen) const {
-  if (misses_ == 0) return kTailEnd;
+  if (misses_ < 2) return kTailEnd + kNearer * static_cast<float>(misses_);
   constexpr float kNearest = 3e-3f;  // [m] from the end
   float best = kTailEnd, highest = -1;
   for (float at = kNearest; at < kTailEnd + kFarthest && at < tail_ - kKnot; at += 1e-3f)

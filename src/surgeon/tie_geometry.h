@@ -10,8 +10,8 @@
 
 namespace catgut {
 
-inline constexpr float kTailEnd = 6e-3f;  // [m] from the tail's end, where it is taken first
-inline constexpr float kKnot = 5e-3f;     // [m] from the middle of the stitch: thread nearer than this belongs to the knot
+inline constexpr float kTailEnd = 6e-3f, kNearer = 2e-3f;  // [m] from the tail's end, where it is taken; more after a miss
+inline constexpr float kKnot = 5e-3f;  // [m] from the middle of the stitch: thread nearer than this belongs to the knot
 
 // Unit: of the needle holder while it ties with the strand on this side (+1: right).
 inline Vec3 shaft_from(float side) { return {side * 0.9063f, 0.4226f, 0}; }
