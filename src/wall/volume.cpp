@@ -87,7 +87,7 @@ void keep_volumes(const Model& m, State& s, Scratch& k) {
       }
     }
   }
-  // What turns or stretches a director farther than that in one step is beyond the derivatives below.
+  // What turns or stretches a director farther than that in one step is beyond the derivatives below. Angular momentum is lost.
   for (const FlatCorner& c : k.flat_corner) {
     Float4& v = s.motion.v[2 * c.at + 1];
     const float most = kTurns * length(vec3(s.motion.x[2 * c.at + 1])) / m.step, speed = length(vec3(v));
