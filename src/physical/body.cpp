@@ -83,7 +83,7 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
   inverse.need(ws.topology, {});
   row.reserve(kMaxRows), points.reserve(kMaxRows), wall_row.reserve(kMaxRows), w.reserve(kMaxRows * kMaxRows);
   for (auto* list : {&speed, &change, &before, &onward}) list->reserve(kMaxRows);
-  face_center.reserve(faces), face_radius.reserve(faces), near.reserve(faces);
+  ball.reserve(faces), near.reserve(faces);
   near_rim.reserve(faces), near_run.reserve(faces);
   around.resize(kMaxBodies);
   for (Around& a : around) a.face.reserve(faces);
@@ -92,21 +92,24 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
   hold.reserve(64), hold_body.reserve(64), hold_at.reserve(64);
 }
 
+const BodiesScratch::Ball& ball_of(const wall::Model& wm, const wall::State& ws, BodiesScratch& k, uint32_t face) {
+  BodiesScratch::Ball& ball = k.ball[face];
+  if (ball.step == k.ball_step) return ball;
+  const Corners c = corners_of(wm, ws.topology, face);
+  const float part = 1.0f / static_cast<float>(c.count);
+  ball.center = {}, ball.step = k.ball_step;
+  for (uint32_t i = 0; i < c.count; ++i) ball.center += wall::vec3(ws.motion.x[2 * c.column[i]]) * part;
+  float radius2 = 0;
+  for (uint32_t i = 0; i < c.count; ++i)
+    radius2 = std::max(radius2, length2(wall::vec3(ws.motion.x[2 * c.column[i]]) - ball.center));
+  ball.radius = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
+  return ball;
+}
+
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                         Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k) {
   const uint32_t faces = wall::elements(wm, ws.topology);
-  k.face_center.resize(faces), k.face_radius.resize(faces), k.around.resize(kMaxBodies);
-  for (uint32_t f = 0; f < faces; ++f) {
-    const Corners c = corners_of(wm, ws.topology, f);
-    const float part = 1.0f / static_cast<float>(c.count);
-    Vec3 center{};
-    for (uint32_t i = 0; i < c.count; ++i) center += wall::vec3(ws.motion.x[2 * c.column[i]]) * part;
-    float radius2 = 0;
-    for (uint32_t i = 0; i < c.count; ++i)
-      radius2 = std::max(radius2, length2(wall::vec3(ws.motion.x[2 * c.column[i]]) - center));
-    k.face_center[f] = center;
-    k.face_radius[f] = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
-  }
+  k.ball.resize(faces), k.around.resize(kMaxBodies), ++k.ball_step;
   if (search.box.size() < faces) search.box.resize(faces);
   if (search.part.size() < surface.patch.size()) search.part.resize(surface.patch.size());
   // A box that is made here is not for later searches of the step: the wall's speed in it is that before the forces.
@@ -135,20 +138,25 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     const bool has_jaws = m.hinge_z > 0;
     if (has_jaws) body.skip = 0;
     // The box of the body, then the faces in it.
-    Vec3 low{1e9f, 1e9f, 1e9f}, high = -low;
-    for (const BodySphere& s : m.sphere) {
-      const Vec3 p = transform(body.pose, local(m, s, body.opening));
-      low = {std::min(low.x, p.x - s.radius), std::min(low.y, p.y - s.radius), std::min(low.z, p.z - s.radius)};
-      high = {std::max(high.x, p.x + s.radius), std::max(high.y, p.y + s.radius), std::max(high.z, p.z + s.radius)};
+    BodiesScratch::Around& a = k.around[b];
+    if (!a.made || !(a.pose == body.pose) || a.opening != body.opening) {
+      a.pose = body.pose, a.opening = body.opening, a.low_here = Vec3{1e9f, 1e9f, 1e9f}, a.high_here = -a.low_here;
+      for (const BodySphere& s : m.sphere) {
+        const Vec3 p = transform(body.pose, local(m, s, body.opening));
+        Vec3 &l = a.low_here, &u = a.high_here;
+        l = {std::min(l.x, p.x - s.radius), std::min(l.y, p.y - s.radius), std::min(l.z, p.z - s.radius)};
+        u = {std::max(u.x, p.x + s.radius), std::max(u.y, p.y + s.radius), std::max(u.z, p.z + s.radius)};
+      }
     }
+    const Vec3 low = a.low_here, high = a.high_here;
     const float fast = std::max(length(moving.v), length(body.velocity));
     const float margin = model.reach + 2 * h * (fast + wall_speed);
     const auto within = [&](uint32_t f, float more) {
-      const Vec3 c = k.face_center[f];
-      const float r = k.face_radius[f] + margin + more;
+      const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+      const Vec3 c = ball.center;
+      const float r = ball.radius + margin + more;
       return c.x > low.x - r && c.y > low.y - r && c.z > low.z - r && c.x < high.x + r && c.y < high.y + r && c.z < high.z + r;
     };
-    BodiesScratch::Around& a = k.around[b];
     const float grown = std::max({a.low.x - low.x, a.low.y - low.y, a.low.z - low.z, high.x - a.high.x, high.y - a.high.y,
                                   high.z - a.high.z, 0.0f}) +
                         margin - a.margin + 5 * static_cast<float>(search.moved - a.moved);
@@ -229,8 +237,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
               std::max(around, distance(transform(body.pose, local(m, m.sphere[j], body.opening)), first) + m.sphere[j].radius);
         k.near_run.clear();
         for (const uint32_t f : k.near) {
-          const float r = 1.001f * (k.face_radius[f] + around + margin);
-          if (length2(k.face_center[f] - first) <= r * r) k.near_run.push_back(f);
+          const float r = 1.001f * (k.ball[f].radius + around + margin);
+          if (length2(k.ball[f].center - first) <= r * r) k.near_run.push_back(f);
         }
       }
       if (s.radius <= 0 || skipped(i)) continue;
@@ -244,8 +252,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       const Vec3 jaw_speed = s.jaw == 0 ? Vec3{} : rotate(body.pose.q, (local(m, s, moving.opening) - in_body) * (1 / h));
       const float reach = s.radius + margin;
       for (const uint32_t f : k.near_run) {
-        const float r = k.face_radius[f] + reach;
-        if (length2(k.face_center[f] - p) > r * r) continue;
+        const float r = k.ball[f].radius + reach;
+        if (length2(k.ball[f].center - p) > r * r) continue;
         // Beyond this, in front of a face or behind it, `add` has no use for it.
         const FaceBox& box = box_here(f);
         const float useful = 1.05f * std::max(reach, 0.9f * wm.laminate.thickness);
@@ -277,8 +285,8 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
         uint32_t strip = surface.first_of_face[f];
         while (strip < last && surface.patch[strip].side != 0) ++strip;
         if (strip == last) continue;
-        const float r = k.face_radius[f] + reach;
-        if (length2(k.face_center[f] - middle) > r * r) continue;
+        const float r = k.ball[f].radius + reach;
+        if (length2(k.ball[f].center - middle) > r * r) continue;
         for (uint32_t q = strip; q < last; ++q) {
           if (least_distance(wm, ws, surface, search, box_here(f), q, middle) > 1.001f * reach ||
               least_of_part(surface, search, q, middle) > 1.001f * reach)

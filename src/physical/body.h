@@ -164,15 +164,24 @@ struct BodiesScratch {
   std::vector<uint32_t> wall_row;
   std::vector<float> w;
   std::vector<Vec3> speed, change, before, onward;
-  std::vector<Vec3> face_center;
-  std::vector<float> face_radius;
+  // A ball round each element, of this step; made by ball_of at its first use.
+  struct Ball {
+    Vec3 center;       // [m]
+    float radius = 0;  // [m]
+    uint64_t step = 0;
+  };
+  std::vector<Ball> ball;
+  uint64_t ball_step = 0;
   std::vector<uint32_t> near, near_rim;  // elements near a body; those of them that have strips
   std::vector<uint32_t> near_run;        // elements near a run of its spheres
   // Elements within some millimeters of a body. A list is kept until body and wall may have come nearer by that much.
   struct Around {
-    Vec3 low, high;    // [m] of the body then
-    float margin = 0;  // [m]
-    double moved = 0;  // SurfaceSearch::moved
+    Pose pose;  // of the body, with its box
+    float opening = 0;
+    Vec3 low_here, high_here;  // [m]
+    Vec3 low, high;            // [m] of the body when the list was made
+    float margin = 0;          // [m]
+    double moved = 0;          // SurfaceSearch::moved
     uint32_t version = 0;
     bool made = false;
     std::vector<uint32_t> face;
@@ -234,6 +243,8 @@ void open_gently(const BodiesModel& model, const Bodies& bodies, const thread::S
 void find_pair_contacts(const BodiesModel& model, const Bodies& bodies, float h, BodiesScratch& k);
 // Contacts of loose needles with the drape.
 void find_drape_contacts(const BodiesModel& model, const Bodies& bodies, const thread::Plane& drape, float h, BodiesScratch& k);
+// The ball round an element in this step.
+const BodiesScratch::Ball& ball_of(const wall::Model& wm, const wall::State& ws, BodiesScratch& k, uint32_t face);
 // Contacts with the wall.
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                         Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k);

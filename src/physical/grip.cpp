@@ -15,13 +15,14 @@ constexpr float kSqueezed = 0.7f;      // of its thickness remains of a wall bet
 constexpr uint32_t kOtherStrand = 12;  // nodes apart along the thread: two places between the same jaws are two strands
 
 // The nearest point of the wall's surface to p among all faces.
-Foot nearest_surface(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+Foot nearest_surface(const wall::Model& wm, const wall::State& ws, const Surface& surface, BodiesScratch& k, Vec3 p,
                      float within) {
   Foot best;
   best.gap = 1e9f;
-  for (uint32_t f = 0; f < k.face_center.size(); ++f) {
-    const float r = k.face_radius[f] + within;
-    if (length2(k.face_center[f] - p) > r * r) continue;
+  for (uint32_t f = 0; f < k.ball.size(); ++f) {
+    const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+    const float r = ball.radius + within;
+    if (length2(ball.center - p) > r * r) continue;
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
       const Foot foot = nearest_on_patch(wm, ws, surface, q, p);
       if (distance(foot.at, p) < best.gap) best = foot, best.gap = distance(foot.at, p);
@@ -59,7 +60,7 @@ void grip_wall(const wall::Model& wm, const wall::State& ws, const Surface& surf
 
 // Two walls between the jaws, such as two edges held together: each jaw holds its own at two points across the shaft.
 // False: there is only one, or a jaw bears on none.
-bool grip_walls(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, const Body& tool,
+bool grip_walls(const wall::Model& wm, const wall::State& ws, const Surface& surface, BodiesScratch& k, const Body& tool,
                 float gap, Grip& grip) {
   constexpr float kReach = 1.2e-3f, kAside = 0.7e-3f;  // [m] from a jaw to its wall; of a point from the jaw's middle
   std::array<Foot, 2> foot;

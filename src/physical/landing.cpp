@@ -144,8 +144,8 @@ Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uin
   best.patch = wall::kNone;
   float far = reach;
   for (const uint32_t f : k.around[body].face) {
-    const float ball = k.face_radius[f] + reach + kMoved;
-    if (length2(k.face_center[f] - p) > ball * ball) continue;
+    const float far_off = k.ball[f].radius + reach + kMoved;
+    if (length2(k.ball[f].center - p) > far_off * far_off) continue;
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
       const float d = distance(foot.at, p);
@@ -201,6 +201,22 @@ void put_thread_out(const Model& m, State& s, Scratch& k, const Hands& hands) {
     return segment >= c.own_first && segment <= c.own_last;
   };
   const bool asleep = s.sleep.any();
+  const auto each_awake = [&](auto&& visit) {
+    const uint32_t segments = static_cast<uint32_t>(t.segments());
+    if (!asleep)
+      for (uint32_t i = 0; i < segments; ++i) visit(i);
+    for (const Sleep::Strand& strand : s.sleep.strand)
+      for (uint32_t i = strand.first; asleep && !strand.asleep && i <= strand.last && i < segments; ++i) visit(i);
+  };
+  // Segments with a node that was put elsewhere by now.
+  float listed = -1;  // Mover::moved then
+  const auto list_put = [&] {
+    if (listed == mover.moved) return;
+    listed = mover.moved, k.put_segment.clear();
+    each_awake([&](uint32_t i) {
+      if (std::max(length2(k.put[i]), length2(k.put[i + 1])) >= kElsewhere * kElsewhere) k.put_segment.push_back(i);
+    });
+  };
   const auto put_all_apart = [&](Mover* by) {
     bool moved = false;
     for (size_t i = 0; i < t.key.size(); ++i) {
@@ -215,13 +231,24 @@ void put_thread_out(const Model& m, State& s, Scratch& k, const Hands& hands) {
       if (!tool_is && mover.moved == 0) continue;
       const Part part = part_of(m, s, k.bodies, index);
       const float far = 0.5f * distance(part.a, part.z) + std::max(part.ra, part.rb) + kLongest;
-      for (uint32_t i = 0; i < t.segments(); ++i) {
-        if (t.broken[i] || length2(t.x.at(i) - (part.a + part.z) * 0.5f) > far * far || (asleep && s.sleep.at(i)) ||
-            (!tool_is && std::max(length2(k.put[i]), length2(k.put[i + 1])) < kElsewhere * kElsewhere) ||
+      const auto look = [&](uint32_t i) {
+        if (t.broken[i] || length2(t.x.at(i) - (part.a + part.z) * 0.5f) > far * far ||
             std::binary_search(t.key.begin(), t.key.end(), i << 16 | (thread::kTool + index)) ||
             is_own(k.bodies.tool[index], i))
-          continue;
+          return;
         moved |= put_apart(m, s, k, hands, i, index, {}, by);
+      };
+      if (tool_is) {
+        each_awake(look);
+        continue;
+      }
+      list_put();
+      for (size_t n = 0; n < k.put_segment.size(); ++n) {
+        const uint32_t i = k.put_segment[n];
+        look(i);
+        if (listed == mover.moved) continue;
+        list_put();
+        n = static_cast<size_t>(std::upper_bound(k.put_segment.begin(), k.put_segment.end(), i) - k.put_segment.begin()) - 1;
       }
     }
     return moved;

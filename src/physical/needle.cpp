@@ -29,15 +29,16 @@ float angle_of(const NeedleModel& n, const Pose& pose, Vec3 p) {
   return angle;
 }
 
-// against: unit; only faces that face a motion along it. Zero: all.
-Foot nearest_face(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+// Of the elements near the needle's body. against: unit; only faces that face a motion along it. Zero: all.
+Foot nearest_face(const wall::Model& wm, const wall::State& ws, const Surface& surface, BodiesScratch& k, uint32_t body, Vec3 p,
                   float within, Vec3 against, float least_slope) {
   Foot best;
   best.gap = 1e9f;
   float facing = -1;
-  for (uint32_t f = 0; f < k.face_center.size(); ++f) {
-    const float r = k.face_radius[f] + within;
-    if (length2(k.face_center[f] - p) > r * r) continue;
+  for (const uint32_t f : k.around[body].face) {
+    const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+    const float r = ball.radius + within;
+    if (length2(ball.center - p) > r * r) continue;
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
       const Foot foot = nearest_on_patch(wm, ws, surface, q, p);
       if ((foot.on_edge && foot.gap < 0) || foot.gap < -0.35f * wm.laminate.thickness) continue;
@@ -92,7 +93,7 @@ void leave_channels(const NeedleModel& m, const wall::Model& wm, const wall::Sta
 
 }  // namespace
 
-wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, BodiesScratch& k, Vec3 p,
                    const wall::Point& from, float& off) {
   wall::Point best;
   off = 1e9f;
@@ -102,8 +103,9 @@ wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& 
   const size_t count = near_faces(wm, from.face, near);
   std::sort(near.begin(), near.begin() + static_cast<std::ptrdiff_t>(count));
   for (const uint32_t f : std::span(near.data(), count)) {
-    const float r = k.face_radius[f] + 1e-3f;
-    if (length2(k.face_center[f] - p) > r * r) continue;
+    const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+    const float r = ball.radius + 1e-3f;
+    if (length2(ball.center - p) > r * r) continue;
     // Outer face, then inner one; a fragment has several such pairs.
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1] && surface.patch[q].side == 1; q += 2) {
       const Foot out = nearest_on_patch(wm, ws, surface, q, p), in = nearest_on_patch(wm, ws, surface, q + 1, p);
@@ -297,7 +299,7 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
     // Just out of a hole, it has no contact with the face that it came through, but with another wall that lies on that face.
     const Channel* last = n.channels > 0 ? &n.channel[n.channels - 1] : nullptr;
     const bool just_out = last && distance(place_of(wm, ws, last->point[last->count - 1]), tip) < kBeside;
-    const Foot foot = nearest_face(wm, ws, surface, k, tip, margin, just_out ? tangent : Vec3{}, law.least_slope);
+    const Foot foot = nearest_face(wm, ws, surface, k, m.body, tip, margin, just_out ? tangent : Vec3{}, law.least_slope);
     if (foot.gap > margin) continue;
     Row row;
     row.key = key(3, foot.patch), row.on_wall = true,

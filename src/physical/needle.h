@@ -106,7 +106,7 @@ inline uint64_t channel_key(uint32_t needle, uint32_t channel, uint32_t point) {
 }
 // The material point at p, on the faces round that of `from` and of the same piece: another wall that touches it has none. off:
 // [m] from p to it.
-wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, const BodiesScratch& k, Vec3 p,
+wall::Point locate(const wall::Model& wm, const wall::State& ws, const Surface& surface, BodiesScratch& k, Vec3 p,
                    const wall::Point& from, float& off);
 // The shaft has left a channel sideways: kTornOut.
 void leave_channel(Needle& needle, uint32_t channel);

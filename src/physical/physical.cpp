@@ -42,7 +42,8 @@ Scratch::Scratch(const Model& m, const State& s) : wall(wall::make_scratch(m.wal
   lips.inverse = wall::Inverse(rows);
   for (wall::Inverse* inverse : {&coupling.inverse, &lips.inverse}) inverse->need(s.wall.topology, {});  // takes its room
   const size_t n = thread::kMaxSoftPoints, columns = wall::columns(s.wall);
-  contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), put.reserve(s.thread.nodes()), tilt.reserve(16 * n);
+  contact.reserve(2 * n), foot.reserve(2 * n), moved.reserve(n), put.reserve(s.thread.nodes()),
+      put_segment.reserve(s.thread.nodes()), tilt.reserve(16 * n);
   coupling.reserve(n);
   lips.reserve(3 * columns);
   search.reserve(m.wall, s.wall, s.thread.nodes());

@@ -88,7 +88,8 @@ struct Scratch {
   std::vector<thread::SoftContact> contact;
   std::vector<Foot> foot;  // per contact
   std::vector<Vec3> moved;
-  std::vector<Vec3> put;  // [m] per node: by landing
+  std::vector<Vec3> put;              // [m] per node: by landing
+  std::vector<uint32_t> put_segment;  // segments whose nodes landing has put elsewhere
   float landing = 0;  // [m] largest distance, in the last step, from where the thread left a point to where the wall arrived
   std::vector<thread::SoftPoints::Tilt> tilt;
   BodiesScratch bodies;

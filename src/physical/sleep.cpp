@@ -217,10 +217,7 @@ bool sleeps_on(const Model& m, const State& s, uint32_t strand, std::span<const 
       return false;
   for (uint32_t i = 0; i < tools.size(); ++i) {
     const thread::ToolCapsule& c = tools[i];
-    const float step = std::max(distance(c.a, c.to_a), distance(c.b, c.to_b));
-    const float reach = c.radius + 0.5f * m.thread.material.diameter + kToolMargin + step;
-    const AwakeThread::Box box{{std::min(c.to_a.x, c.to_b.x), std::min(c.to_a.y, c.to_b.y), std::min(c.to_a.z, c.to_b.z)},
-                               {std::max(c.to_a.x, c.to_b.x), std::max(c.to_a.y, c.to_b.y), std::max(c.to_a.z, c.to_b.z)}};
+    const auto& [box, reach] = awake.tool[i];
     if (apart(box, awake.box[strand], reach) || !touches(s.thread, me, c.to_a, c.to_b, reach)) continue;
     if (std::none_of(z.touched.begin(), z.touched.end(),
                      [&](const Sleep::Touched& t) { return t.strand == strand && t.tool == i; }))
@@ -285,7 +282,10 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
   // Pulled, cut, laced, or a tool was put elsewhere.
   if (!m.sleep.on || !hands.pulls.empty() || s.thread.travel > 1e8f || holes != z.holes) wake(m, s);
   z.holes = holes;
-  if (!z.any()) return;
+  if (!z.any()) {
+    awake.boxed.clear();
+    return;
+  }
   const uint32_t n = static_cast<uint32_t>(z.strand.size());
   if (awake.far_due.size() != n) awake.far_due.assign(n, -1);
   awake.box.resize(n), awake.carry.assign(n, {});
@@ -297,7 +297,15 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
     awake.carry[k] = carry_of(m.sleep, std::span(z.watched).subspan(first, i - first), s.wall, k);
     carry(m, s, k, awake.carry[k]);
   }
-  for (uint32_t k = 0; k < n; ++k) awake.box[k] = box_of(s.thread, z.strand[k]);
+  // A strand that sleeps where it lies keeps its box.
+  awake.boxed.resize(n);
+  for (uint32_t k = 0; k < n; ++k) {
+    const Sleep::Strand& strand = z.strand[k];
+    const bool lies = strand.asleep && !is_carried(s, k);
+    if (!lies || awake.boxed[k].first != strand.first || awake.boxed[k].last != strand.last)
+      awake.box[k] = box_of(s.thread, strand);
+    awake.boxed[k] = lies ? strand : Sleep::Strand{1, 0};
+  }
   awake.disturbed.assign(n, 0);
   for (const Sleep::Watched& w : z.watched) {
     const Carry& by = awake.carry[w.strand];
@@ -331,6 +339,13 @@ void wake_strands(const Model& m, State& s, const Hands& hands, std::span<const 
   for (uint32_t k = 0; k < n; ++k)  // a loop without slack would be taut now
     if (const float loop = z.strand[k].asleep ? z.strand[k].loop : 0; loop > 0 && loop_length(m, s, k) > loop + m.sleep.longer)
       awake.disturbed[k] = 1;
+  awake.tool.clear();
+  for (const thread::ToolCapsule& c : tools) {
+    const float step = std::max(distance(c.a, c.to_a), distance(c.b, c.to_b));
+    const AwakeThread::Box box{{std::min(c.to_a.x, c.to_b.x), std::min(c.to_a.y, c.to_b.y), std::min(c.to_a.z, c.to_b.z)},
+                               {std::max(c.to_a.x, c.to_b.x), std::max(c.to_a.y, c.to_b.y), std::max(c.to_a.z, c.to_b.z)}};
+    awake.tool.push_back({box, c.radius + 0.5f * m.thread.material.diameter + kToolMargin + step});
+  }
   for (uint32_t k = 0; k < n; ++k)
     if (z.strand[k].asleep && !sleeps_on(m, s, k, holds, tools, wall_moved, awake)) wake_one(m, s, k);
   for (bool more = true; more;) {

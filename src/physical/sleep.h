@@ -116,7 +116,13 @@ struct AwakeThread {
   struct Box {
     Vec3 low, high;  // [m]
   };
-  std::vector<Box> box;         // per strand, with its nodes' half segments
+  struct Tool {
+    Box box;
+    float reach = 0;  // [m] of the thread's axis beyond which the tool cannot touch it
+  };
+  std::vector<Tool> tool;
+  std::vector<Box> box;              // per strand, with its nodes' half segments
+  std::vector<Sleep::Strand> boxed;  // per strand: whose box that is, if it sleeps and nothing carries it; else {1, 0}
   std::vector<double> far_due;  // per strand: SurfaceSearch::moved before which no column that is not watched can come near
   void reserve(const State& state);
 };

@@ -115,7 +115,7 @@ bool tear_bites(const Model& m, State& s, std::span<const Vec3> impulse, Surface
   return out;
 }
 
-void tear_channels(const Model& m, State& s, const BodiesScratch& k) {
+void tear_channels(const Model& m, State& s, BodiesScratch& k) {
   const float h = m.wall.step, part = std::min(1.0f, h / m.tear.smoothing);
   const Surface& surface = surface_of(m, s);
   const auto place = [&](const wall::Point& p) {

@@ -47,6 +47,6 @@ float bite_strength(const Model& model, const State& state, uint32_t entry, uint
 bool tear_bites(const Model& model, State& state, std::span<const Vec3> impulse, SurfaceSearch& search);
 
 // After the bodies' step: the shaft of a needle tears the wall across its channel as the thread of a bite does.
-void tear_channels(const Model& model, State& state, const BodiesScratch& bodies);
+void tear_channels(const Model& model, State& state, BodiesScratch& bodies);
 
 }  // namespace catgut::physical

@@ -542,7 +542,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   for (const Command& c : input.commands)
     if (c.kind == CommandKind::new_suture) sewing.refuse(c);  // not with physical mechanics yet
   cut_thread(model, state);
-  find_candidates(model.solver, state.solver, state.scratch, std::clamp(0.5f * model.dt, 0.002f, 0.008f), times);
+  find_tool_candidates(model.solver, state.solver, state.scratch, std::clamp(0.5f * model.dt, 0.002f, 0.008f), times);
   begin_haptics(state);
   k.puncture.clear(), std::fill(k.depth.begin(), k.depth.end(), 0.0f);
   use_scissors(model, state, k.world);

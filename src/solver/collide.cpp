@@ -192,8 +192,18 @@ void find_thread_on_thread(const CollideView& v, uint32_t a, uint32_t b, Candida
 
 }  // namespace
 
-void find_tool_and_thread_candidates(const CollideView& v, float margin, Candidates& c) {
+void find_tool_candidates(const CollideView& v, float margin, Candidates& c) {
   c.tool.clear();
+  for (uint32_t b = 0; b < v.body.size(); ++b)
+    for (uint32_t k = 0; v.body_collides[b] && k < v.model[b].capsule.size(); ++k) {
+      const Capsule& capsule = v.model[b].capsule[k];
+      const Vec3 p = transform(v.body[b].pose(), capsule.a), q = transform(v.body[b].pose(), capsule.b);
+      find_tissue_near(v, b, k, p, q, capsule.radius + v.tissue.tool_radius + margin, c);
+    }
+}
+
+void find_tool_and_thread_candidates(const CollideView& v, float margin, Candidates& c) {
+  find_tool_candidates(v, margin, c);
   c.thread_tool.clear();
   c.thread_tissue.clear();
   c.thread_pair.clear();
@@ -204,7 +214,6 @@ void find_tool_and_thread_candidates(const CollideView& v, float margin, Candida
       const Capsule& capsule = v.model[b].capsule[k];
       const Vec3 p = transform(v.body[b].pose(), capsule.a), q = transform(v.body[b].pose(), capsule.b);
       const float reach = capsule.radius + v.tissue.tool_radius + margin;
-      find_tissue_near(v, b, k, p, q, reach, c);
       find_thread_near(v, b, k, p, q, least(p, q) - all(reach), most(p, q) + all(reach), margin, c);
     }
   }

@@ -162,6 +162,12 @@ void find_candidates(const SolverModel& m, const SolverState& s, SolverScratch& 
   find_tool_pairs(m.body, s.body, s.body_collides, k.candidates.tool_pair);
 }
 
+void find_tool_candidates(const SolverModel& m, const SolverState& s, SolverScratch& k, float margin, StageTimes* times) {
+  StageTimer timer(times, Stage::broadphase);
+  find_tool_candidates({m.collision, s.x.data(), m.strand, s.strand, m.body, s.body, s.body_collides}, margin, k.candidates);
+  find_tool_pairs(m.body, s.body, s.body_collides, k.candidates.tool_pair);
+}
+
 void substep(const SolverModel& m, SolverState& s, SolverScratch& k, Jobs& jobs, StageTimes* times) {
   Vec4* x = s.x.data();
   const float* w = m.inv_mass.data();

@@ -91,6 +91,9 @@ void find_boxes(const SolverModel& model, const SolverState& state, SolverScratc
 // tissue. Reads the boxes. margin [m]: maximum relative motion in a tick.
 void find_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, float margin,
                      StageTimes* times);
+// The same of tools with tissue and with each other alone.
+void find_tool_candidates(const SolverModel& model, const SolverState& state, SolverScratch& scratch, float margin,
+                          StageTimes* times);
 void substep(const SolverModel& model, SolverState& state, SolverScratch& scratch, Jobs& jobs, StageTimes* times);
 
 // [m/N] compliance per particle equivalent to a stiffness s in (0, 1] at substep h, and back (XPBD: s = w / (w + alpha/h^2)).
