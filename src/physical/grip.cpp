@@ -68,7 +68,13 @@ bool grip_walls(const wall::Model& wm, const wall::State& ws, const Surface& sur
     foot[i] = nearest_surface(wm, ws, surface, k, transform(tool.pose, {(i == 0 ? -0.5f : 0.5f) * gap, 0, 0}), kReach);
     if (foot[i].gap > kReach) return false;
   }
-  if (distance(foot[0].at, foot[1].at) < 1.5f * wm.laminate.thickness) return false;
+  // The middle of one wall is the same from both sides; two that are squeezed hard still have theirs apart.
+  const auto middle = [&](const Foot& f) {
+    wall::Weights w = wall::weights(wm, ws.topology, f.point);
+    w.zeta = 0;
+    return wall::place(w, ws.motion);
+  };
+  if (distance(middle(foot[0]), middle(foot[1])) < 0.5f * wm.laminate.thickness) return false;
   grip = {};
   grip.what = Gripped::tissue, grip.size = std::min(gap, 2 * kSqueezed * wm.laminate.thickness);
   for (const Foot& f : foot) {

@@ -1073,6 +1073,37 @@ TEST(Tool, jaws_hold_both_of_two_edges_between_them) {
     EXPECT_LT(distance(before[sheet], at_edge(sheet)), 0.1e-3f) << "let go, neither is hooked into the other: sheet " << sheet;
 }
 
+// Two edges that lie on each other are squeezed to less than one and a half of a wall before the jaws hold anything.
+TEST(Tool, jaws_hold_both_of_two_edges_that_are_squeezed) {
+  Bench bench(0.03f, 0.02f, true);
+  constexpr float kThickness = wall::SheetShape{}.thickness;
+  put_two_sheets(bench, kThickness + 0.1e-3f,
+                 [](const wall::SheetShape& shape, Vec3 p) { return p.y > 0.5f * shape.height - 1e-4f; });
+  const Vec3 x{0, 0, 1}, z{0, -1, 0};
+  const Pose pose{Vec3{0.015f, 0.0025f, 0.5f * kThickness}, from_axes(x, cross(z, x), z)};
+  const uint32_t t = bench.add(make_tool({}), pose, 0.4f);
+  bench.start();
+  Body& tool = bench.body(t);
+  const auto close = [&](int steps, uint32_t may_hold) {
+    for (int i = 0; i < steps; ++i) {
+      bench.target[t] = {pose, true, 0, 6, may_hold};
+      bench.step();
+    }
+  };
+  close(400, 3);  // not tissue
+  EXPECT_EQ(tool.grip.what, Gripped::nothing);
+  const auto jaw = [&](float side) {
+    return transform(tool.pose, Vec3{side * tool.opening * bench.model.bodies.body[t].hinge_z, 0, 0});
+  };
+  EXPECT_LT(distance(jaw(-1), jaw(1)), 1.5f * kThickness);
+  close(200, 7);
+  ASSERT_EQ(tool.grip.what, Gripped::tissue);
+  std::array<int, 2> points{};
+  for (uint32_t i = 0; i < tool.grip.count; ++i) ++points[tool.grip.point[i].tissue.face < kFacesOfSheet ? 0 : 1];
+  EXPECT_EQ(points[0], 2);
+  EXPECT_EQ(points[1], 2);
+}
+
 // Two hands push their instruments into each other, a strand between them. They pass through each other in scenes, so that the
 // strand is inside both: it gives way and does not break.
 TEST(Tool, thread_between_two_instruments_does_not_break) {
