@@ -346,6 +346,12 @@ const std::vector<ResultName>& result_names() {
         {"stitch_gap", "m", "the same where a stitch crosses from one wall to the other; 0 without such a stitch"},
         {"stitch_tension", "N",
          "tension of the thread there at the end, the smallest of all stitches; a knot that holds keeps one"},
+        {"stitch_slip", "m",
+         "movement within half a second of the two walls of a finished stitch while 1 N pulls them apart at its holes, the "
+         "largest; one stitch after the other at the end, only if [expect] names it or stitch_bears"},
+        {"stitch_bears", "N",
+         "tension of the thread then, the smallest of all stitches; a free stitch has 0.5, a slack one or one without a knot "
+         "less"},
         {"stitches_finished", "", "sutures of at least two points whose thread is cut off its needle; 0 with guided mechanics"},
         {"throws_held", "",
          "throws that the thread of a finished stitch shows at the end, the fewest of all; 0 without one, and with guided "

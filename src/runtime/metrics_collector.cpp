@@ -295,6 +295,7 @@ void MetricsCollector::finish(const Snapshot& last, RunResult& result) const {
   v.try_emplace("surgeon_retries", 0);
   v.try_emplace("surgeon_done", 0);
   v.try_emplace("contacts_dropped", 0);
+  v.try_emplace("stitch_slip", kNotMeasured), v.try_emplace("stitch_bears", kNotMeasured);
 
   result.solver_ms = percentiles_of(solver_ms_);
   result.tick_ms = percentiles_of(tick_ms_);

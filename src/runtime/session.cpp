@@ -5,18 +5,21 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 #include <thread>
 
 #include "core/check.h"
 #include "procedure/scene_file.h"
 #include "runtime/hands.h"
 #include "sim/simulation.h"
+#include "sim/stitch_pull.h"
 
 namespace catgut {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr double kAfterDone = 0.5;       // [s] simulated: the tissue settles
+constexpr float kStitchPull = 1;         // [N] on either wall of a stitch; its bites bear 2.5 at least
 constexpr uint64_t kValidityTicks = 16;  // interval of the validity check: early detection at no measurable cost
 
 double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
@@ -83,7 +86,23 @@ class Run {
     if (result.interrupted) result.ended = "interrupted";
     if (!metrics_.valid()) result.ended = "invalid state";
     result.value["contacts_dropped"] = dropped_contacts(*state_);
+    if (!stopped() && metrics_.valid()) pull_stitches(scene, result);
     metrics_.finish(seen_, result);
+  }
+
+  // Pulls each finished stitch apart. Seconds of work for a scene of many stitches, so only if the scene expects something of
+  // it.
+  void pull_stitches(const SceneSpec& scene, RunResult& result) {
+    const auto asked = [](const Expectation& e) { return e.name == "stitch_slip" || e.name == "stitch_bears"; };
+    if (scene.mechanics.kind != "physical" || std::none_of(scene.expect.begin(), scene.expect.end(), asked)) return;
+    std::optional<double> slips, bears;
+    for (const StitchMeasures& m : measure_stitches(seen_)) {
+      if (!m.finished) continue;
+      const StitchPull pull = pull_stitch(*model_, *state_, m.suture, kStitchPull, jobs_);
+      slips = std::max(slips.value_or(-1e9), static_cast<double>(pull.slip));
+      bears = std::min(bears.value_or(1e9), static_cast<double>(pull.tension));
+    }
+    if (slips) result.value["stitch_slip"] = *slips, result.value["stitch_bears"] = *bears;
   }
 
   std::shared_ptr<const Model> model_;

@@ -9,6 +9,7 @@
 // grips by pinch, puncture and the needle's channel are solved together with the wall.
 #pragma once
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/jobs.h"
@@ -71,7 +72,9 @@ std::shared_ptr<const PhysicalModel> make_physical(const Model& model, const wal
 PhysicalState start_physical(const Model& model, const SolverState& solver);
 
 // --- running -----------------------------------------------------------------------------------------------------------
-void step_physical(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times);
+// wall_pulls: forces that no hand exerts, for measurements.
+void step_physical(const Model& model, State& state, const TickInput& input, Jobs& jobs, StageTimes* times,
+                   std::span<const physical::Hands::WallPull> wall_pulls = {});
 // Places the bites and suture points of suture `which` on the wall as it is cut now.
 void publish_holes(const Model& model, const State& state, size_t which, SutureView& out);
 // After a load: what follows from the cuts of the wall.

@@ -524,7 +524,8 @@ void publish_holes(const Model& model, const State& state, size_t which, SutureV
   }
 }
 
-void step_physical(const Model& model, State& state, const TickInput& given, Jobs& jobs, StageTimes* times) {
+void step_physical(const Model& model, State& state, const TickInput& given, Jobs& jobs, StageTimes* times,
+                   std::span<const physical::Hands::WallPull> wall_pulls) {
   TickInput input = given;
   switch_pens(model, state, input);
   if (!state.physical.scratch) state.physical.scratch = std::make_shared<PhysicalScratch>(model, state.physical);
@@ -548,7 +549,7 @@ void step_physical(const Model& model, State& state, const TickInput& given, Job
   use_scissors(model, state, k.world);
   const MovingClamps clamps(model, state, input.commands, k.world.wall);
   physical::Hands hands;
-  hands.targets = k.target, hands.plane = &k.drape;
+  hands.targets = k.target, hands.plane = &k.drape, hands.wall_pulls = wall_pulls;
   for (int i = 1; i <= model.substeps; ++i) {
     StageTimer timer(times, Stage::thread);
     follow_hands(model, state, input, static_cast<float>(i) / static_cast<float>(model.substeps));

@@ -35,7 +35,7 @@ constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-s
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 3;
 constexpr int kFirstWraps = 2;     // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
-constexpr int kRingThrows = 5;     // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
+constexpr int kRingThrows = 4;     // where no clamp draws the edges apart again: only a taut loop keeps two throws from opening
 constexpr float kRingPull = 2.6f;  // [N] of its throws; with 1.7 N the loops are 0.2 mm wider
 // [m] by which the needle's circle lies deeper than in a rigid wall: a soft one gives way, and the tip enters where it is
 // square to it. Less deep, it slid along the serosa and came out through the cut edge.

@@ -14,6 +14,7 @@
 #include "procedure/scripted_surgeon.h"
 #include "sim/model.h"
 #include "sim/state.h"
+#include "sim/stitch_pull.h"
 #include "thread/observe.h"
 
 namespace catgut {
@@ -477,6 +478,7 @@ struct Closed {
   int cuts = 0;                                       // pairs of the thread that are cut or broken
   float open = 0, let_go = 0, away = 0, removed = 0;  // [m] gap at first, when the last hand let go, later, without the thread
   float away_for = 0;                                 // [s]
+  float slip = 0, bears = 0;                          // [m], [N] of StitchPull with 1 N
   int retries = 0;                                    // throws wound again
   thread::SeenKnot knot;
 };
@@ -521,6 +523,10 @@ Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "inter
   }
   result.away_for = static_cast<float>(state->tick - held) * model->dt;
   result.away = gap_at_top(picture, seen);
+  if (seen.active().suture_point.size() >= 2) {
+    const StitchPull pull = pull_stitch(*model, *state, 0, 1, jobs);
+    result.slip = pull.slip, result.bears = pull.tension;
+  }
   // The knot of the piece that is left in the wound.
   const SutureView& suture = seen.active();
   std::vector<Vec3> piece;
@@ -538,10 +544,12 @@ Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "inter
   thread.eyelet.clear(), thread.travel = 1e9f;
   for (int t = 0; t < 90; ++t) tick(no_hands);
   result.removed = gap_at_top(picture, seen);
-  std::printf("gap %.2f mm, hands away %.2f, seconds later %.2f, without the thread %.2f; %s, %u throws\n",
-              1e3 * static_cast<double>(result.open), 1e3 * static_cast<double>(result.let_go),
-              1e3 * static_cast<double>(result.away), 1e3 * static_cast<double>(result.removed),
-              std::string(thread::name_of(result.knot.name)).c_str(), result.knot.throws);
+  std::printf(
+      "gap %.2f mm, hands away %.2f, seconds later %.2f, slips by %.3f under 1 N and bears %.2f N, without the thread %.2f; "
+      "%s, %u throws\n",
+      1e3 * static_cast<double>(result.open), 1e3 * static_cast<double>(result.let_go), 1e3 * static_cast<double>(result.away),
+      1e3 * static_cast<double>(result.slip), static_cast<double>(result.bears), 1e3 * static_cast<double>(result.removed),
+      std::string(thread::name_of(result.knot.name)).c_str(), result.knot.throws);
   return result;
 }
 
@@ -554,6 +562,8 @@ void expect_closed_by_thread(const Closed& r, float open) {
   EXPECT_NEAR(r.open, 3e-3f, 0.1e-3f);
   EXPECT_LT(r.away, 1e-3f);
   EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
+  EXPECT_LT(r.slip, 0.02e-3f) << "pulled with 1 N at its holes";
+  EXPECT_GT(r.bears, 0.4f);
   EXPECT_GT(r.removed, open) << "something other than the thread held it";
 }
 
@@ -598,6 +608,7 @@ TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.cuts, 0);
   EXPECT_GT(r.away, 2e-3f);
+  EXPECT_GT(r.slip, 0.2e-3f) << "it slides";
 }
 
 // A purse-string of six bites with one needle, drawn by both hands: its thread alone gathers the opening. Cut while both hands
