@@ -81,12 +81,12 @@ class Run {
     result.ticks = ticks_;
     result.simulated_s = simulated_s();
     result.state_hash = hash_state(*model_, *state_);
+    if (!stopped() && metrics_.valid()) pull_stitches(scene, result);
     result.interrupted = stopped();
     if (enough_) result.ended = "stopped by callback";
     if (result.interrupted) result.ended = "interrupted";
     if (!metrics_.valid()) result.ended = "invalid state";
     result.value["contacts_dropped"] = dropped_contacts(*state_);
-    if (!stopped() && metrics_.valid()) pull_stitches(scene, result);
     metrics_.finish(seen_, result);
   }
 
@@ -96,9 +96,14 @@ class Run {
     const auto asked = [](const Expectation& e) { return e.name == "stitch_slip" || e.name == "stitch_bears"; };
     if (scene.mechanics.kind != "physical" || std::none_of(scene.expect.begin(), scene.expect.end(), asked)) return;
     std::optional<double> slips, bears;
-    for (const StitchMeasures& m : measure_stitches(seen_)) {
-      if (!m.finished) continue;
-      const StitchPull pull = pull_stitch(*model_, *state_, m.suture, kStitchPull, jobs_);
+    const std::vector<StitchMeasures> stitches = measure_stitches(seen_);
+    for (size_t i = 0; i < stitches.size(); ++i) {
+      if (!stitches[i].finished) continue;
+      if (stopped()) return;
+      if (hooks_.on_progress)
+        hooks_.on_progress({simulated_s(), simulated_s(), simulated_s() * 1000 / metrics_.spent_ms(),
+                            "pull stitch " + std::to_string(i + 1) + " of " + std::to_string(stitches.size())});
+      const StitchPull pull = pull_stitch(*model_, *state_, stitches[i].suture, kStitchPull, jobs_);
       slips = std::max(slips.value_or(-1e9), static_cast<double>(pull.slip));
       bears = std::min(bears.value_or(1e9), static_cast<double>(pull.tension));
     }
