@@ -31,7 +31,7 @@ constexpr float kDeepFar = 0.25f, kDeepNear = 0.45f;
 constexpr float kDeepest = 0.9f;        // of the wall: a deeper one is made again
 constexpr float kTouch = 0.0003f;       // [m] by which the sides of a slit in skin are brought further than they meet
 constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of each end: inverted edges make it shorter
-constexpr float kGather = 2.0f;         // [N] of each end of a physical purse-string
+constexpr float kGather = 3.0f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 3;
 constexpr int kFirstWraps = 2;     // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go

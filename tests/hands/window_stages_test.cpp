@@ -246,6 +246,11 @@ size_t clamps_on_the_rim(const Snapshot& seen) {
   for (const InstrumentView& i : seen.instrument) n += i.place == InstrumentPlace::parked && i.held == Held::tissue;
   return n;
 }
+bool score_between_clamps(Person& me) {
+  constexpr float kBesideClamp = 0.5f;  // [rad]
+  return me.carry(0, {0.02f, 0.05f, 0}) && me.take_instrument(0, "cautery") &&
+         me.score(0, kLine, kFrom + kBesideClamp, kTo + kBesideClamp);
+}
 void expect_a_cut(const AtTheWindow& desk, size_t clamps) {
   EXPECT_EQ(clamps, 4u);
   EXPECT_EQ(desk.lesson_run().stage, 1u) << "clamp, cut";
@@ -447,7 +452,20 @@ TEST_F(StitchAtTheWindow, a_clamp_and_the_pen_by_simulated_arms) {
   expect_clamp_and_score(at.desk);
 }
 
-// Mouse and gamepad: stages_test, in lock step.
+// The second stage begins with what the scripted surgeon has done in the first one. By gamepad: stages_test, in lock step.
+TEST_F(StitchAtTheWindow, an_operation_is_resumed_at_its_cut_by_mouse) {
+  if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
+  XMouse desk(x_->display, 400, 1, "altemeier");
+  if (!desk.ready()) GTEST_SKIP() << "no XTest here";
+  desk.lesson = "altemeier", desk.prepare = begin_at_the_cut;
+  Person me(desk);
+  size_t clamps = 0;
+  bool done = false;
+  desk.sit([&] { clamps = clamps_on_the_rim(desk.look().seen), done = score_between_clamps(me); }, true);
+  EXPECT_TRUE(done) << me.doing();
+  expect_a_cut(desk, clamps);
+}
+
 TEST_F(StitchAtTheWindow, an_operation_is_resumed_at_its_cut_by_simulated_arms) {
   if (!std::getenv("CATGUT_LONG")) GTEST_SKIP() << "set CATGUT_LONG=1";
   AtTheArms at(x_->display, "altemeier");
