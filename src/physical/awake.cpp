@@ -38,8 +38,8 @@ void AwakeThread::reserve(const State& s) {
   point_of.reserve(thread::kMaxEyelets), hole_of.reserve(thread::kMaxEyelets), impulse.reserve(thread::kMaxSoftPoints);
   key.reserve(2 * pairs), budget.reserve(2 * pairs), crossing.reserve(2 * pairs), eyelet.reserve(thread::kMaxEyelets);
   contact.reserve(2 * thread::kMaxSoftPoints), ready.reserve(nodes), disturbed.reserve(nodes), box.reserve(nodes),
-      boxed.reserve(nodes), carry.reserve(nodes), far_due.reserve(nodes), load_at.reserve(4 * wall::columns(s.wall)),
-      room.reserve(2 * wall::columns(s.wall));
+      boxed.reserve(nodes), tool.reserve(kMaxThreadCapsules), carry.reserve(nodes), far_due.reserve(nodes),
+      load_at.reserve(4 * wall::columns(s.wall)), room.reserve(2 * wall::columns(s.wall));
 }
 
 void gather(const State& s, AwakeThread& k) {
