@@ -562,8 +562,6 @@ void expect_closed_by_thread(const Closed& r, float open) {
   EXPECT_NEAR(r.open, 3e-3f, 0.1e-3f);
   EXPECT_LT(r.away, 1e-3f);
   EXPECT_NEAR(r.away, r.let_go, 0.2e-3f);
-  EXPECT_LT(r.slip, 0.02e-3f) << "pulled with 1 N at its holes";
-  EXPECT_GT(r.bears, 0.4f);
   EXPECT_GT(r.removed, open) << "something other than the thread held it";
 }
 
@@ -573,6 +571,8 @@ TEST(PhysicalScene, the_thread_alone_closes_a_wound) {
   const Closed r = sew_and_leave({});
   expect_closed_by_thread(r, 2.5e-3f);
   EXPECT_EQ(r.knot.name, thread::KnotName::surgeons);
+  EXPECT_LT(r.slip, 0.02e-3f) << "pulled with 1 N at its holes";
+  EXPECT_GT(r.bears, 0.4f);
 }
 
 // The second throw is missed, and the first one opens meanwhile: it is drawn tight again, and the second wound again.
@@ -608,7 +608,7 @@ TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.cuts, 0);
   EXPECT_GT(r.away, 2e-3f);
-  EXPECT_GT(r.slip, 0.2e-3f) << "it slides";
+  EXPECT_LT(r.bears, 0.4f) << "pulled with 1 N at its holes";
 }
 
 // A purse-string of six bites with one needle, drawn by both hands: its thread alone gathers the opening. Cut while both hands
