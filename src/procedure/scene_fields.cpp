@@ -345,7 +345,7 @@ const std::vector<ResultName>& result_names() {
         {"ring_gap", "m", "largest gap round the rim of the second body to the cut edge of the first; 0 without such an edge"},
         {"stitch_gap", "m", "the same where a stitch crosses from one wall to the other; 0 without such a stitch"},
         {"stitch_tension", "N",
-         "tension of the thread there at the end, the smallest of all stitches; a knot that holds keeps one"},
+         "tension of the thread there at the end, the smallest of all stitches; a slack one beside taut ones may hold"},
         {"stitch_slip", "m",
          "movement within half a second of the two walls of a finished stitch while 1 N pulls them apart at its holes, the "
          "largest; one stitch after the other at the end, only if [expect] names it or stitch_bears"},

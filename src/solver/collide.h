@@ -69,8 +69,8 @@ struct CollideView {
 };
 // Finds all candidates that involve tools or thread, with a margin [m] for motion within the tick. c.tissue.boxes must be up
 // to date.
-void find_tool_candidates(const CollideView& v, float margin, Candidates& c);  // those of tools and tissue alone
 void find_tool_and_thread_candidates(const CollideView& v, float margin, Candidates& c);
+void find_tool_candidates(const CollideView& v, float margin, Candidates& c);  // those of tools and tissue alone
 // Once per tick: capsules of different tools that may touch within it. Tools are bodies whose weight a hand carries; the
 // needle is excluded, because jaws close on it.
 void find_tool_pairs(const std::vector<RigidModel>& model, const std::vector<RigidBody>& body,
