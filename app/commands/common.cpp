@@ -114,7 +114,16 @@ void ProcedureWatch::tick(const Snapshot& seen) {
 void ProcedureWatch::save_stage(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state) {
   if (!run.begun || run.stage < saved_ || finished(run, procedure)) return;
   saved_ = run.stage + 1;
-  std::string name = procedure.name + "_" + procedure.stage[run.stage].name + ".cgrec";
+  write_state(folder, "_" + procedure.stage[run.stage].name, scene, model, state);
+}
+
+void ProcedureWatch::save_end(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state) {
+  write_state(folder, "", scene, model, state);
+}
+
+void ProcedureWatch::write_state(const std::string& folder, const std::string& stage, const SceneSpec& scene,
+                                 const Model& model, const State& state) {
+  std::string name = procedure.name + stage + ".cgrec";
   std::replace(name.begin(), name.end(), ' ', '_');
   const std::string path = (std::filesystem::path(folder) / name).string();
   prepare_output(path);

@@ -82,10 +82,12 @@ int run(RunOptions& o) {
     log.tick(seen);
     if (pictures) pictures->tick(seen, doing);
   };
-  if (procedure && !o.states.empty())
+  if (procedure && !o.states.empty()) {
     hooks.on_step = [&](const Model& model, const State& state, const TickInput&) {
       procedure->save_stage(o.states, scene, model, state);
     };
+    hooks.on_end = [&](const Model& model, const State& state) { procedure->save_end(o.states, scene, model, state); };
+  }
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
   const LiveResult session = log.result();
@@ -132,7 +134,8 @@ void add_run(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false);
   command->add_option("--record", o->session.record, "write a recording")->type_name("FILE.cgrec");
   command->add_option("--json", o->json, "results as JSON; -: standard output")->type_name("FILE|-");
-  command->add_option("--states", o->states, "with --procedure: saves the state in which each stage begins")->type_name("DIR");
+  command->add_option("--states", o->states, "with --procedure: saves the state in which each stage begins, and the last one")
+      ->type_name("DIR");
   command->add_option("--csv", o->csv, "stitches, forces, faults and tension over time as a table; -: standard output")
       ->type_name("FILE|-");
   command->add_option("--mesh", o->mesh, "organ surface of the first body, file or file#node")->type_name("FILE");

@@ -347,10 +347,10 @@ const std::vector<ResultName>& result_names() {
         {"stitch_tension", "N",
          "tension of the thread there at the end, the smallest of all stitches; a slack one beside taut ones may hold"},
         {"stitch_slip", "m",
-         "movement within half a second of the two walls of a finished stitch while 1 N pulls them apart at its holes, the "
+         "movement within a second of the two walls of a finished stitch while 2 N pull them apart at its holes, the "
          "largest; one stitch after the other at the end, only if [expect] names it or stitch_bears"},
         {"stitch_bears", "N",
-         "tension of the thread then, the smallest of all stitches; a free stitch has 0.5, a slack one or one without a knot "
+         "tension of the thread then, the smallest of all stitches; a free stitch has 1, a slack one or one without a knot "
          "less"},
         {"stitches_finished", "", "sutures of at least two points whose thread is cut off its needle; 0 with guided mechanics"},
         {"throws_held", "",

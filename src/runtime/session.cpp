@@ -19,7 +19,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr double kAfterDone = 0.5;       // [s] simulated: the tissue settles
-constexpr float kStitchPull = 1;         // [N] on either wall of a stitch; its bites bear 2.5 at least
+constexpr float kStitchPull = 2;         // [N] on either wall of a stitch; its bites bear 2.5 at least
 constexpr uint64_t kValidityTicks = 16;  // interval of the validity check: early detection at no measurable cost
 
 double ms_since(Clock::time_point start) { return std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
@@ -81,6 +81,7 @@ class Run {
     result.ticks = ticks_;
     result.simulated_s = simulated_s();
     result.state_hash = hash_state(*model_, *state_);
+    if (hooks_.on_end) hooks_.on_end(*model_, *state_);
     if (!stopped() && metrics_.valid()) pull_stitches(scene, result);
     result.interrupted = stopped();
     if (enough_) result.ended = "stopped by callback";

@@ -35,6 +35,7 @@ struct SessionHooks {
   std::function<void(const Snapshot&, const std::string& doing)> on_tick;
   // The result of the tick; before on_cost.
   std::function<void(const Model&, const State&, const TickInput&)> on_step;
+  std::function<void(const Model&, const State&)> on_end;  // the last state; also of a run that was stopped
   // Time of the tick, per stage and total [ms]; false: ends the run.
   std::function<bool(const Snapshot&, const StageTimes&, double tick_ms)> on_cost;
   std::function<void(const Progress&)> on_progress;  // about once per second of wall time

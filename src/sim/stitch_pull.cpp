@@ -15,7 +15,7 @@
 namespace catgut {
 namespace {
 
-constexpr float kGrows = 0.5f, kFollows = 0.25f, kStays = 0.5f;  // [s]
+constexpr float kGrows = 0.5f, kFollows = 0.25f, kStays = 1;  // [s]
 
 // The first hole of the second wall.
 size_t second_wall(const std::vector<SuturePointView>& point) {

@@ -15,7 +15,7 @@ struct StitchPull {
   float tension = 0;  // [N] largest of the thread between its first and its last hole, at the end; 0 if it lost a hole
 };
 // With all hands away, the two walls are pulled apart at the holes of this suture. The force on either wall grows to `force`
-// [N] in half a second. The walls follow for a quarter, and the slip is measured in another half. Walls are those of
+// [N] in half a second. The walls follow for a quarter, and the slip is measured in one second more. Walls are those of
 // SuturePointView; with one wall, the first half of the holes is pulled from the second. The suture has two holes at least.
 StitchPull pull_stitch(const Model& model, const State& state, size_t suture, float force, Jobs& jobs);
 

@@ -34,6 +34,14 @@ TEST_F(CommandLine, run_and_replay_write_the_same_results) {
   EXPECT_NE(table.find("\ntension,70,"), std::string::npos);
 }
 
+TEST_F(CommandLine, a_procedure_saves_its_last_state_beside_those_of_its_stages) {
+  ASSERT_EQ(run_catgut("run --procedure stay --headless --no-expect --seconds 3 --states s --json a.json").code, 0);
+  EXPECT_TRUE(fs::exists(folder_ / "s" / "stay_take.cgrec"));
+  ASSERT_EQ(run_catgut("replay s/stay.cgrec --json b.json").code, 0);
+  const auto hash_in = [&](const char* file) { return json::parse(read_file(folder_ / file))["state_hash"]; };
+  EXPECT_EQ(hash_in("a.json"), hash_in("b.json"));
+}
+
 // Human small bowel tears out at 4.62 +- 1.40 N (Gong 2023): the model surgeon stays below a standard deviation less.
 TEST_F(CommandLine, the_scripted_surgeon_pulls_no_harder_than_bowel_bears_and_drops_nothing) {
   std::vector<std::string> scenes{"stay", "skin"};

@@ -478,7 +478,7 @@ struct Closed {
   int cuts = 0;                                       // pairs of the thread that are cut or broken
   float open = 0, let_go = 0, away = 0, removed = 0;  // [m] gap at first, when the last hand let go, later, without the thread
   float away_for = 0;                                 // [s]
-  float slip = 0, bears = 0;                          // [m], [N] of StitchPull with 1 N
+  float slip = 0, bears = 0;                          // [m], [N] of StitchPull with 2 N
   int retries = 0;                                    // throws wound again
   thread::SeenKnot knot;
 };
@@ -524,7 +524,7 @@ Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "inter
   result.away_for = static_cast<float>(state->tick - held) * model->dt;
   result.away = gap_at_top(picture, seen);
   if (seen.active().suture_point.size() >= 2) {
-    const StitchPull pull = pull_stitch(*model, *state, 0, 1, jobs);
+    const StitchPull pull = pull_stitch(*model, *state, 0, 2, jobs);
     result.slip = pull.slip, result.bears = pull.tension;
   }
   // The knot of the piece that is left in the wound.
@@ -545,7 +545,7 @@ Closed sew_and_leave(const std::vector<size_t>& tasks, const char* name = "inter
   for (int t = 0; t < 90; ++t) tick(no_hands);
   result.removed = gap_at_top(picture, seen);
   std::printf(
-      "gap %.2f mm, hands away %.2f, seconds later %.2f, slips by %.3f under 1 N and bears %.2f N, without the thread %.2f; "
+      "gap %.2f mm, hands away %.2f, seconds later %.2f, slips by %.3f under 2 N and bears %.2f N, without the thread %.2f; "
       "%s, %u throws\n",
       1e3 * static_cast<double>(result.open), 1e3 * static_cast<double>(result.let_go), 1e3 * static_cast<double>(result.away),
       1e3 * static_cast<double>(result.slip), static_cast<double>(result.bears), 1e3 * static_cast<double>(result.removed),
@@ -571,7 +571,7 @@ TEST(PhysicalScene, the_thread_alone_closes_a_wound) {
   const Closed r = sew_and_leave({});
   expect_closed_by_thread(r, 2.5e-3f);
   EXPECT_EQ(r.knot.name, thread::KnotName::surgeons);
-  EXPECT_LT(r.slip, 0.02e-3f) << "pulled with 1 N at its holes";
+  EXPECT_LT(r.slip, 0.02e-3f) << "pulled with 2 N at its holes";
   EXPECT_GT(r.bears, 0.4f);
 }
 
@@ -608,7 +608,7 @@ TEST(PhysicalScene, one_throw_does_not_hold_a_wound) {
   ASSERT_TRUE(r.done);
   EXPECT_EQ(r.cuts, 0);
   EXPECT_GT(r.away, 2e-3f);
-  EXPECT_LT(r.bears, 0.4f) << "pulled with 1 N at its holes";
+  EXPECT_LT(r.bears, 0.4f) << "pulled with 2 N at its holes";
 }
 
 // A purse-string of six bites with one needle, drawn by both hands: its thread alone gathers the opening. Cut while both hands
