@@ -272,7 +272,8 @@ void find_needle_rows(const NeedlesModel& model, const BodiesModel& bm, const wa
       row.kind = Row::Kind::channel, row.key = channel_key(i, c, 63), row.on_wall = true;
       row.axis = tangent;
       row.point = across_load(row.point, ws.motion, row.axis);
-      row.wanted = (there - tip) * (1 / h);
+      n.give = tip - there;
+      row.wanted = -n.give * (1 / h);
       row.soft = 1 / (law.side_stiffness * h * h);
       row.along_limit = law.cutting * h, row.friction = 0, row.across_limit = law.most * h;
       add(row, tip);
@@ -361,9 +362,11 @@ void advance_needles(const NeedlesModel& model, const wall::Model& wm, const wal
       out = true;
     }
     if (out) continue;
-    // The tip's material point follows along the needle; what is left across is the tissue's elastic give.
-    const Vec3 there = place_of(wm, ws, n.tip);
-    const float along = dot(tip - there, tangent);
+    // The tip's material point follows along the needle; what is left across is the tissue's elastic give. A needle that turns
+    // about its tip turns part of that into its direction, and has cut nothing: else it sank by a millimeter into the wall.
+    const Vec3 there = place_of(wm, ws, n.tip), give = tip - there;
+    const float most = length(give - tangent * dot(give, tangent));
+    const float along = dot(give, tangent) - std::clamp(dot(n.give, tangent), -most, most);
     float off = 0;
     const wall::Point at = locate(wm, ws, surface, k, there + tangent * along, n.tip, off);
     if (off < 1e8f) n.tip = at;

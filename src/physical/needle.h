@@ -88,6 +88,7 @@ struct Needle {
   uint32_t tip_row = wall::kNone;
   uint32_t exit_row[2] = {wall::kNone, wall::kNone};
   wall::Point tip_on, exit_on[2];  // where they act
+  Vec3 give;                       // [m] from the tip's material point to the tip, before it: by the tissue's elasticity
 };
 
 // A body and a needle of this shape. `body`: its index in BodiesModel.

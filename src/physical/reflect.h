@@ -53,7 +53,7 @@ constexpr void reflect(auto& a, Like<Channel> auto& c) {
 constexpr void reflect(auto& a, Like<Needle> auto& n) {
   a(n.thread_node), a(n.channel), a.at_most(n.channels, uint32_t{kMaxChannels}), a(n.inside), a(n.tip), a(n.entry_peak);
   a(n.exit_peak), a(n.events), a.cache(n.tip_row), a.cache(n.exit_row), a.cache(n.tip_on), a.cache(n.exit_on);
-  a.cache(n.torn), a.cache(n.torn_hole);
+  a.cache(n.torn), a.cache(n.torn_hole), a.cache(n.give);
 }
 constexpr void reflect(auto& a, Like<Hole> auto& h) {
   a(h.place), a(h.within), a(h.deepest), a(h.made), a(h.torn), a(h.out), a(h.load);

@@ -511,6 +511,38 @@ TEST(Needle, drawn_backward_it_does_not_enter) {
     }
 }
 
+// The tip is in the sheet, not through it. Then the hand turns the needle about its tip until it lies along the sheet. The tip
+// has cut no further: what the tissue gives beside the needle is not a way of its tip.
+TEST(Needle, turned_about_its_tip_it_does_not_sink_into_the_wall) {
+  Bench bench;
+  const uint32_t n = bench.add_needle({}, {});
+  const NeedleModel& needle = bench.model.needles.needle[0];
+  const Needle& in = bench.state.needle[0];
+  float angle = 0.3f;
+  place_body(bench.model.bodies.body[n], bench.body(n), on_circle(needle, kCircle, angle), 0);
+  bench.start();
+  while ((!in.inside || in.tip.zeta > 0.3f) && angle < 3) {
+    angle += 1.5e-3f;
+    bench.target[n] = {on_circle(needle, kCircle, angle), true};
+    bench.step();
+  }
+  ASSERT_TRUE(in.inside);
+  const float before = in.tip.zeta;
+  const Pose from = on_circle(needle, kCircle, angle), onward = on_circle(needle, kCircle, angle + 0.01f);
+  const Vec3 tip = tip_of(needle, from), axis = normalized(rotation_vector(onward.q * conjugate(from.q)));
+  const float turn = std::asin(std::min(1.0f, std::abs(arc_tangent(needle, from, needle.shape.arc).z)));
+  for (int i = 1; i <= 400; ++i) {
+    const Quat by = axis_angle(axis, turn * static_cast<float>(i) / 400);
+    bench.target[n] = {{tip + rotate(by, from.p - tip), by * from.q}, true};
+    bench.step();
+  }
+  const float sunk = 0.5f * (before - in.tip.zeta) * bench.model.wall.laminate.thickness;
+  std::printf("turned by %.2f rad: %.3f mm deeper\n", static_cast<double>(turn), 1e3 * static_cast<double>(sunk));
+  EXPECT_GT(turn, 0.3f);
+  EXPECT_TRUE(in.inside);
+  EXPECT_NEAR(sunk, 0, 0.3e-3f) << "by 1.6 mm when the give counted as a way";
+}
+
 // A hand moves a needle that is through the sheet once along y, across the plane of its arc, to the sheet's border. The tissue
 // is a spring between needle and channel. At the strength of a bite the needle tears a slit, which is as long as its way.
 TEST(Needle, drawn_across_its_channel_it_tears_a_slit_with_the_strength_of_a_bite) {
