@@ -32,6 +32,9 @@ constexpr int kAgain = 2;               // times that a bite is made again from 
 constexpr float kBeside = 0.002f;       // [m] from the place where it failed
 constexpr float kDrawOut = 20;          // [s] to draw a thread out
 constexpr float kScoopSpeed = 0.7f;     // of the needle's speed, with which it is lifted then
+constexpr float kEntered = 0.4f;        // of the wall: deep enough to be turned
+constexpr float kFlattenSpeed = 4;      // [rad/s]
+constexpr float kTurnMore = 400;        // [rad/m] where a correction of the depth is one of that turn: 0.2 rad for kDeeper
 
 }  // namespace
 
@@ -113,6 +116,19 @@ bool Scripted::hold_edge(const Snapshot& seen) {
   }
 }
 
+void Scripted::turn_about_tip(float by) {
+  const auto to_center = [&] { return frame_.out * portable::cos(psi_) - frame_.along * portable::sin(psi_); };
+  const Vec3 before = to_center();
+  psi_ += by, flattened_ += by;
+  frame_.at += (to_center() - before) * shape().needle_radius;
+}
+
+// A needle whose circle lies less deep would not enter at all: it is turned more in the wall instead.
+void Scripted::correct_depth(float shallower) {
+  if (plan_.flatten > 0) turn_fix_ += kTurnMore * shallower;
+  else next_fix_ = shallower;
+}
+
 bool Scripted::make_bite(const Snapshot& seen) {
   enum { hover, approach, drive, withdraw, let_go, over, down, close, release, retreat, bring };
   const float speed = skill_.speed, psi_bite = half_bite_angle();
@@ -134,7 +150,7 @@ bool Scripted::make_bite(const Snapshot& seen) {
     }
     case approach: {
       hold_or_rest(seen);
-      scooped_ = 0, hard_ = 0;
+      scooped_ = 0, flattened_ = 0, hard_ = 0;
       frame_ = frame(seen, place_);
       if (bite().walls > 1 && seen.tool[kForceps].held == Held::tissue)  // midway between both edges, where it holds them
         frame_.at += frame_.along * (dot(seen.tool[kForceps].pose.p - frame_.at, frame_.along) + kYieldsBack);
@@ -156,16 +172,21 @@ bool Scripted::make_bite(const Snapshot& seen) {
     case drive: {
       doing_ = name_of_bite() + "drive the needle";
       hold_or_rest(seen);
-      psi_ += skill_.drive_speed / shape().needle_radius * dt_;
       // Square to the wall until the tip is deep enough in it, then shallow.
-      if (plan_.scoop > 0 && seen.active().needle.in_tissue && seen.active().bite.back().depth > bite().deep * skill_.wall) {
+      const float depth = seen.active().needle.in_tissue ? seen.active().bite.back().depth / skill_.wall : 0;
+      if (flattened_ < plan_.flatten + turn_fix_ && depth > kEntered) {
+        turn_about_tip(std::min(plan_.flatten + turn_fix_ - flattened_, kFlattenSpeed * dt_));
+      } else {
+        psi_ += skill_.drive_speed / shape().needle_radius * dt_;
+      }
+      if (plan_.scoop > 0 && depth > bite().deep) {
         const float up = std::min(plan_.scoop - scooped_, kScoopSpeed * skill_.drive_speed * dt_);
         frame_.at += frame_.out * up, scooped_ += up;
       }
       move(kNeedleHolder, holding(kNeedleHolder, needle_at(frame_, psi_)), 2 * speed);
       const int passed = passages(seen, false);
       if (too_deep(seen)) {
-        next_fix_ = kDeeper;
+        correct_depth(kDeeper);
         go(withdraw);
         return false;
       }
@@ -182,8 +203,9 @@ bool Scripted::make_bite(const Snapshot& seen) {
         return false;
       }
       // A shallow bite that holds too little is made again, deeper.
-      if (plan_.scoop > 0 && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
-        next_fix_ = -kDeeper;
+      const bool shallow = plan_.scoop > 0 || plan_.flatten > 0;
+      if (shallow && passed > 0 && seen.active().bite.back().depth < kTooShallow * skill_.wall) {
+        correct_depth(-kDeeper);
         go(withdraw);
       } else if (passed >= bite().walls && psi_ > psi_bite + plan_.beyond) {
         go(seen.tool[kForceps].held == Held::tissue ? let_go : over);

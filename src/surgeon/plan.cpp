@@ -23,15 +23,16 @@ constexpr float kPullRunning = 2.2f;      // [N] the same of a running suture, w
 constexpr float kPullShallow = 0.9f;
 constexpr float kPullThrough = 1.7f;    // [N] of bites in and out through a whole wall
 constexpr float kApproximate = 0.003f;  // [m] of each clamp: the edges touch after 1.5 mm
-// A shallow bite in a wall that is held by its edge: it gives way by this much before the tip enters, and then the needle is
-// lifted.
+// A shallow bite in a wall that is held by its edge: it gives way by this much before the tip enters, and springs back onto it.
+// Then the needle is lifted; or turned about its tip, else it goes through the wall into the lumen (docs/closure.md).
 constexpr float kGivesWay = 0.002f, kScoop = 0.003f;  // [m]
+constexpr float kFlatten = 0.4f;                      // [rad]
 // Of the wall, where a Lembert bite is lifted. Far from the edge the wall springs back onto the needle when the tip is in.
 constexpr float kDeepFar = 0.25f, kDeepNear = 0.45f;
 constexpr float kDeepest = 0.9f;        // of the wall: a deeper one is made again
 constexpr float kTouch = 0.0003f;       // [m] by which the sides of a slit in skin are brought further than they meet
 constexpr float kMobile = 0.0021f;      // [m] that a Lembert suture takes of each end: inverted edges make it shorter
-constexpr float kGather = 3.0f;         // [N] of each end of a physical purse-string
+constexpr float kGather = 2.5f;         // [N] of each end of a physical purse-string
 constexpr float kGatherByThrow = 3.2f;  // [N] the same through a throw, whose friction takes a part
 constexpr int kThrows = 3;
 constexpr int kFirstWraps = 2;     // turns of a surgeon's throw, the first of a knot: it gives back less when the hands let go
@@ -150,13 +151,13 @@ Plan sewn_round(const PictureModel& picture, const SurgeonSkill& skill) {
   Plan plan;
   plan.lift = 0.012f;
   plan.driver_at = 0.2f, plan.beyond = 0.6f;
-  plan.scoop = kScoop;
+  plan.flatten = kFlatten;
   plan.pull = kGather, plan.jerk = 0.1f;
   places_round(picture, skill, skill.bites, skill.edge_distance, plan, 0.5f);
   // The wall gives way by kGivesWay before the tip enters.
   const float radius = picture.suture[0].needle_radius;
   for (BitePlace& p : plan.place) {
-    p.depth += kGivesWay;
+    p.depth += kGivesWay, p.deepest = 1;
     p.length = 2 * std::sqrt(p.depth * (2 * radius - p.depth));
   }
   add_bites(plan, skill.bites, true);

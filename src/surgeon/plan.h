@@ -83,6 +83,7 @@ struct Plan {
   // `tip_psi` past the deepest point [rad].
   float tip_lean = 0.8f, tip_psi = 2.6f;
   float scoop = 0;        // [m] by which the needle is lifted once it is deep enough in the wall, at most
+  float flatten = 0;      // [rad] by which it is turned about its tip when that has entered
   float approximate = 0;  // [m] travel of each clamp
   float stay = 0;         // [m] of it by which the clamp stays advanced: the ends are mobile
   float jerk = 0;         // [s] of more than the maximum load after which thread is not pulled further: a jerk is shorter

@@ -116,7 +116,7 @@ void Scripted::begin() {
   waited_ = 0;
   misses_ = 0;
   attempts_ = 0;
-  depth_fix_ = next_fix_ = 0;
+  depth_fix_ = next_fix_ = turn_fix_ = 0;
   steady_ = 0;
   // Exponentially distributed, without the long tail.
   if (skill_.pause > 0) pause_left_ = skill_.pause * std::min(4.0f, -portable::log(std::max(1e-6f, 1 - ability_.uniform())));

@@ -132,6 +132,9 @@ class Scripted final : public Surgeon {
   int passages(const Snapshot& seen, bool complete) const;
   // Of the bite in hand, where the plan asks for a part of the wall.
   bool too_deep(const Snapshot& seen) const;
+  // The needle in its bite, with its tip where it is: `by` [rad] nearer to the direction along the wall.
+  void turn_about_tip(float by);
+  void correct_depth(float shallower);  // [m] for the next attempt
   // Jaws that hold the needle, and no thread beside it.
   bool holds_well(const Snapshot& seen, size_t hand) const;
   // The needle slits a wall of the bite in hand.
@@ -241,10 +244,12 @@ class Scripted final : public Surgeon {
   float miss_by_ = 0;         // [m] distance by which this grasp misses
   float depth_fix_ = 0;       // [m] correction from failed attempts at this bite; positive: shallower
   float next_fix_ = 0;        // [m] of the attempt that is withdrawn, in addition
+  float turn_fix_ = 0;        // [rad] added to Plan::flatten
   int again_ = 0;             // times that this bite is made again from the start
   size_t points_before_ = 0;  // suture points of the suture, when the sweep began
   Pose pull_from_;
   float scooped_ = 0;            // [m] by which this bite was lifted
+  float flattened_ = 0;          // [rad] by which it was turned
   float hard_ = 0;               // [s] that the needle has needed too much force
   float steady_ = 0;             // [s] of full tension
   std::array<float, 2> felt_{};  // [N] in the strands of a hand, smoothed
