@@ -89,14 +89,13 @@ struct ProcedureWatch {
   void tick(const Snapshot& seen);
   // FOLDER/NAME_STAGE.cgrec, a recording without ticks, when a stage has begun.
   void save_stage(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state);
-  // FOLDER/NAME.cgrec, likewise: the last state.
-  void save_end(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state);
+  std::string last_state_file(const std::string& folder) const { return state_file(folder, ""); }  // FOLDER/NAME.cgrec
+  static void save_state_as(const std::string& path, const SceneSpec& scene, const std::vector<std::byte>& state);
   Procedure procedure;
   ProcedureRun run;
 
  private:
-  void write_state(const std::string& folder, const std::string& stage, const SceneSpec& scene, const Model& model,
-                   const State& state);
+  std::string state_file(const std::string& folder, const std::string& stage) const;
   double tick_s_ = 1.0 / 60, settle_s_ = 0;  // [s]
   size_t saved_ = 0;                         // stages
 };

@@ -114,20 +114,18 @@ void ProcedureWatch::tick(const Snapshot& seen) {
 void ProcedureWatch::save_stage(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state) {
   if (!run.begun || run.stage < saved_ || finished(run, procedure)) return;
   saved_ = run.stage + 1;
-  write_state(folder, "_" + procedure.stage[run.stage].name, scene, model, state);
+  save_state_as(state_file(folder, "_" + procedure.stage[run.stage].name), scene, save_state(model, state));
 }
 
-void ProcedureWatch::save_end(const std::string& folder, const SceneSpec& scene, const Model& model, const State& state) {
-  write_state(folder, "", scene, model, state);
-}
-
-void ProcedureWatch::write_state(const std::string& folder, const std::string& stage, const SceneSpec& scene,
-                                 const Model& model, const State& state) {
+std::string ProcedureWatch::state_file(const std::string& folder, const std::string& stage) const {
   std::string name = procedure.name + stage + ".cgrec";
   std::replace(name.begin(), name.end(), ' ', '_');
-  const std::string path = (std::filesystem::path(folder) / name).string();
+  return (std::filesystem::path(folder) / name).string();
+}
+
+void ProcedureWatch::save_state_as(const std::string& path, const SceneSpec& scene, const std::vector<std::byte>& state) {
   prepare_output(path);
-  Recorder(path, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)}, save_state(model, state)).finish(false);
+  Recorder(path, RecordingHeader{catgut_version(), kStateVersion, write_scene(scene)}, state).finish(false);
 }
 
 void add_threads_option(CLI::App& command, int& threads) {

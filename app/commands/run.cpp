@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "commands/commands.h"
@@ -14,6 +15,7 @@
 #include "procedure/scene_file.h"
 #include "runtime/report.h"
 #include "runtime/session_log.h"
+#include "sim/simulation.h"
 
 namespace catgut {
 namespace {
@@ -55,6 +57,10 @@ int run(RunOptions& o) {
   const SceneSpec scene = scene_for(o, procedure ? &procedure->procedure : nullptr);
   check_picture_files(o.pictures);
   check_suffix(o.session.record, ".cgrec", "--record");
+  if (procedure && !o.states.empty() && !o.session.record.empty() &&
+      std::filesystem::weakly_canonical(o.session.record) ==
+          std::filesystem::weakly_canonical(procedure->last_state_file(o.states)))
+    throw InputError("--record", "--states writes the last state to the same file", "choose another name");
   check_suffix(o.json, ".json", "--json");
   check_suffix(o.csv, ".csv", "--csv");
   for (const std::string& path : {o.json, o.csv, o.session.record, o.pictures.video, o.pictures.contact_sheet})
@@ -82,11 +88,12 @@ int run(RunOptions& o) {
     log.tick(seen);
     if (pictures) pictures->tick(seen, doing);
   };
+  std::vector<std::byte> last_state;
   if (procedure && !o.states.empty()) {
     hooks.on_step = [&](const Model& model, const State& state, const TickInput&) {
       procedure->save_stage(o.states, scene, model, state);
     };
-    hooks.on_end = [&](const Model& model, const State& state) { procedure->save_end(o.states, scene, model, state); };
+    hooks.on_end = [&](const Model& model, const State& state) { last_state = save_state(model, state); };
   }
   const RunResult result = run_session(scene, o.session, hooks);
   end_progress_line();
@@ -99,7 +106,9 @@ int run(RunOptions& o) {
   const bool quiet = o.json == "-" || o.csv == "-";
   if (!quiet) std::fputs(run_summary(result, !o.no_expect).c_str(), stdout);
   if (procedure && !quiet) std::fputs(run_table(procedure->run, procedure->procedure).c_str(), stdout);
-  if (pictures) pictures->finish();  // last: an error in a picture does not lose results
+  // Last: an error in a state or in a picture does not lose results.
+  if (!last_state.empty()) procedure->save_state_as(procedure->last_state_file(o.states), scene, last_state);
+  if (pictures) pictures->finish();
   if (result.interrupted) return 130;
   if (o.no_expect) return 0;
   return result.expectations_hold() && (!procedure || faultless(procedure->run, procedure->procedure)) ? 0 : 1;

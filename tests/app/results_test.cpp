@@ -40,6 +40,7 @@ TEST_F(CommandLine, a_procedure_saves_its_last_state_beside_those_of_its_stages)
   ASSERT_EQ(run_catgut("replay s/stay.cgrec --json b.json").code, 0);
   const auto hash_in = [&](const char* file) { return json::parse(read_file(folder_ / file))["state_hash"]; };
   EXPECT_EQ(hash_in("a.json"), hash_in("b.json"));
+  expect_refused("run --procedure stay --headless --seconds 3 --states s --record s/stay.cgrec", "--record");
 }
 
 // Human small bowel tears out at 4.62 +- 1.40 N (Gong 2023): the model surgeon stays below a standard deviation less.
