@@ -83,10 +83,14 @@ void BodiesScratch::reserve(const wall::Model& wm, const wall::State& ws) {
   inverse.need(ws.topology, {});
   row.reserve(kMaxRows), points.reserve(kMaxRows), wall_row.reserve(kMaxRows), w.reserve(kMaxRows * kMaxRows);
   for (auto* list : {&speed, &change, &before, &onward}) list->reserve(kMaxRows);
-  ball.reserve(faces), near.reserve(faces);
-  near_rim.reserve(faces), near_run.reserve(faces);
+  ball.reserve(faces);
+  near_run.reserve(faces);
   around.resize(kMaxBodies);
-  for (Around& a : around) a.face.reserve(faces);
+  constexpr size_t kMaxSpheres = 192;
+  for (Around& a : around) {
+    a.in_body.reserve(kMaxSpheres), a.at_here.reserve(kMaxSpheres), a.run.reserve(kMaxSpheres / kRun);
+    a.face.reserve(faces), a.run_face.reserve(4 * faces), a.run_rim.reserve(2 * faces);
+  }
   moving.reserve(64), tool.reserve(kMaxThreadCapsules), tool_body.reserve(kMaxThreadCapsules);
   loose.reserve(kMaxBodies), loose_body.reserve(kMaxBodies);
   hold.reserve(64), hold_body.reserve(64), hold_at.reserve(64);
@@ -99,12 +103,72 @@ const BodiesScratch::Ball& ball_of(const wall::Model& wm, const wall::State& ws,
   const float part = 1.0f / static_cast<float>(c.count);
   ball.center = {}, ball.step = k.ball_step;
   for (uint32_t i = 0; i < c.count; ++i) ball.center += wall::vec3(ws.motion.x[2 * c.column[i]]) * part;
-  float radius2 = 0;
-  for (uint32_t i = 0; i < c.count; ++i)
+  float radius2 = 0, half2 = 0;
+  for (uint32_t i = 0; i < c.count; ++i) {
     radius2 = std::max(radius2, length2(wall::vec3(ws.motion.x[2 * c.column[i]]) - ball.center));
-  ball.radius = std::sqrt(radius2) + length(wall::vec3(ws.motion.x[2 * c.column[0] + 1])) * 1.2f;
+    half2 = std::max(half2, length2(wall::vec3(ws.motion.x[2 * c.column[i] + 1])));
+  }
+  ball.radius = 1.001f * (std::sqrt(radius2) + std::sqrt(half2));
   return ball;
 }
+
+namespace {
+
+// Spheres of a body where it is now, with the box and the balls about them.
+void place_spheres(const BodyModel& m, const Body& body, BodiesScratch::Around& a) {
+  const size_t n = m.sphere.size();
+  a.pose = body.pose, a.opening = body.opening, a.low_here = Vec3{1e9f, 1e9f, 1e9f}, a.high_here = -a.low_here;
+  a.in_body.resize(n), a.at_here.resize(n), a.run.resize((n + kRun - 1) / kRun);
+  for (size_t i = 0; i < n; ++i) {
+    const BodySphere& s = m.sphere[i];
+    a.in_body[i] = local(m, s, body.opening);
+    const Vec3 p = a.at_here[i] = transform(body.pose, a.in_body[i]);
+    Vec3 &l = a.low_here, &u = a.high_here;
+    l = {std::min(l.x, p.x - s.radius), std::min(l.y, p.y - s.radius), std::min(l.z, p.z - s.radius)};
+    u = {std::max(u.x, p.x + s.radius), std::max(u.y, p.y + s.radius), std::max(u.z, p.z + s.radius)};
+  }
+  a.farthest = a.lever = 0;
+  for (size_t i = 0; i < n; ++i) {
+    a.farthest = std::max(a.farthest, distance(a.in_body[i], m.center) + m.sphere[i].radius);
+    if (m.sphere[i].jaw != 0) a.lever = std::max(a.lever, distance(m.sphere[i].at, {0, 0, m.hinge_z}));
+  }
+  for (size_t r = 0; r < a.run.size(); ++r) {
+    BodiesScratch::Run& run = a.run[r];
+    // One sphere more: the capsule that goes to it is of this run.
+    const size_t first = r * kRun, end = std::min(n, first + kRun + 1);
+    run.center_here = {}, run.radius_here = 0;
+    for (size_t i = first; i < end; ++i) run.center_here += a.at_here[i] / static_cast<float>(end - first);
+    for (size_t i = first; i < end; ++i)
+      run.radius_here = std::max(run.radius_here, distance(a.at_here[i], run.center_here) + m.sphere[i].radius);
+  }
+}
+
+// The elements within `reach` [m] of a body, and of each of its runs.
+void list_faces(const wall::Model& wm, const wall::State& ws, const Surface& surface, float reach, BodiesScratch::Around& a,
+                BodiesScratch& k) {
+  a.face.clear(), a.run_face.clear(), a.run_rim.clear();
+  const uint32_t faces = static_cast<uint32_t>(k.ball.size());
+  for (uint32_t f = 0; f < faces; ++f) {
+    const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+    const Vec3 c = ball.center, l = a.low_here, u = a.high_here;
+    const float r = ball.radius + reach;
+    if (c.x > l.x - r && c.y > l.y - r && c.z > l.z - r && c.x < u.x + r && c.y < u.y + r && c.z < u.z + r) a.face.push_back(f);
+  }
+  for (BodiesScratch::Run& run : a.run) {
+    run.center = run.center_here, run.radius = run.radius_here;
+    run.face_first = static_cast<uint32_t>(a.run_face.size()), run.rim_first = static_cast<uint32_t>(a.run_rim.size());
+    for (uint32_t f = 0; f < faces; ++f) {
+      const float r = k.ball[f].radius + run.radius + reach;
+      if (length2(k.ball[f].center - run.center) > r * r) continue;
+      a.run_face.push_back(f);
+      const uint32_t first = surface.first_of_face[f], end = surface.first_of_face[f + 1];
+      if (first < end && surface.patch[end - 1].side == 0) a.run_rim.push_back(f);
+    }
+    run.face_end = static_cast<uint32_t>(a.run_face.size()), run.rim_end = static_cast<uint32_t>(a.run_rim.size());
+  }
+}
+
+}  // namespace
 
 void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const wall::State& ws, const Surface& surface,
                         Bodies& bodies, float h, SurfaceSearch& search, BodiesScratch& k) {
@@ -119,7 +183,6 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       box_of(wm, ws, search, f), search.box[f].step = search.step | kHere;
     return search.box[f];
   };
-  constexpr uint32_t kRun = 8;  // spheres
   // A wall gives in its thickness, which the solve does not know: jaws that close on it from both sides would need any force,
   // and so would jaws that open between walls.
   constexpr float kInner = 0.3f;  // of a contact's normal, along the way in which the jaw opens: on its inner side
@@ -137,39 +200,25 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     const uint64_t before = body.skip;
     const bool has_jaws = m.hinge_z > 0;
     if (has_jaws) body.skip = 0;
-    // The box of the body, then the faces in it.
     BodiesScratch::Around& a = k.around[b];
-    if (!a.made || !(a.pose == body.pose) || a.opening != body.opening) {
-      a.pose = body.pose, a.opening = body.opening, a.low_here = Vec3{1e9f, 1e9f, 1e9f}, a.high_here = -a.low_here;
-      for (const BodySphere& s : m.sphere) {
-        const Vec3 p = transform(body.pose, local(m, s, body.opening));
-        Vec3 &l = a.low_here, &u = a.high_here;
-        l = {std::min(l.x, p.x - s.radius), std::min(l.y, p.y - s.radius), std::min(l.z, p.z - s.radius)};
-        u = {std::max(u.x, p.x + s.radius), std::max(u.y, p.y + s.radius), std::max(u.z, p.z + s.radius)};
-      }
-    }
-    const Vec3 low = a.low_here, high = a.high_here;
+    if (!a.made || !(a.pose == body.pose) || a.opening != body.opening) place_spheres(m, body, a);
     const float fast = std::max(length(moving.v), length(body.velocity));
-    const float margin = model.reach + 2 * h * (fast + wall_speed);
-    const auto within = [&](uint32_t f, float more) {
-      const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
-      const Vec3 c = ball.center;
-      const float r = ball.radius + margin + more;
-      return c.x > low.x - r && c.y > low.y - r && c.z > low.z - r && c.x < high.x + r && c.y < high.y + r && c.z < high.z + r;
-    };
-    const float grown = std::max({a.low.x - low.x, a.low.y - low.y, a.low.z - low.z, high.x - a.high.x, high.y - a.high.y,
-                                  high.z - a.high.z, 0.0f}) +
-                        margin - a.margin + 5 * static_cast<float>(search.moved - a.moved);
-    if (!a.made || a.version != ws.topology.version || grown > kAhead) {
-      a.low = low, a.high = high, a.margin = margin, a.moved = search.moved, a.version = ws.topology.version, a.made = true;
-      a.face.clear();
-      for (uint32_t f = 0; f < faces; ++f)
-        if (within(f, kAhead)) a.face.push_back(f);
+    const float most = model.reach + 2 * h * (fast + wall_speed);  // of a list
+    // What `add` below may use in this step, at most.
+    const float any_point =
+        std::max(length(moving.v) + length(moving.w) * a.farthest, length(body.velocity) + length(body.spin) * a.farthest) +
+        std::abs(moving.opening - body.opening) * a.lever / h + search.speed;
+    const float margin = std::min(most, model.reach + 1.01f * h * std::max(1.8f * any_point, kThrown));
+    float nearer = 0;  // [m]
+    for (const BodiesScratch::Run& run : a.run)
+      nearer = std::max(nearer, distance(run.center_here, run.center) + run.radius_here - run.radius);
+    if (!a.made || a.version != ws.topology.version ||
+        nearer + most - a.margin + 5 * static_cast<float>(search.moved - a.moved) > kAhead) {
+      a.margin = most, a.moved = search.moved, a.version = ws.topology.version, a.made = true;
+      list_faces(wm, ws, surface, most + kAhead, a, k);
     }
-    k.near.clear();
-    for (const uint32_t f : a.face)
-      if (within(f, 0)) k.near.push_back(f);
-    if (k.near.empty()) continue;
+    for (size_t i = 0; m.falls && i < a.face.size(); ++i)
+      ball_of(wm, ws, k, a.face[i]);  // for `locate`, at the end of the step
     const Grip& grip = body.grip;
     const bool holds_tissue = grip.what == Gripped::tissue;
     const Vec3 jaws = body.pose.p;
@@ -229,21 +278,17 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
     for (uint32_t i = 0; i < m.sphere.size(); ++i) {
       const BodySphere& s = m.sphere[i];
       if (i % kRun == 0) {
-        // Of the elements near the body, those near this run of spheres.
-        Vec3 first = transform(body.pose, local(m, s, body.opening));
-        float around = s.radius;
-        for (uint32_t j = i + 1; j < std::min<size_t>(i + kRun, m.sphere.size()); ++j)
-          around =
-              std::max(around, distance(transform(body.pose, local(m, m.sphere[j], body.opening)), first) + m.sphere[j].radius);
+        const BodiesScratch::Run& run = a.run[i / kRun];
         k.near_run.clear();
-        for (const uint32_t f : k.near) {
-          const float r = 1.001f * (k.ball[f].radius + around + margin);
-          if (length2(k.ball[f].center - first) <= r * r) k.near_run.push_back(f);
+        for (const uint32_t f : a.faces(run)) {
+          const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+          const float r = 1.001f * (ball.radius + run.radius_here + margin);
+          if (length2(ball.center - run.center_here) <= r * r) k.near_run.push_back(f);
         }
       }
+      if (k.near_run.empty() && !holds_tissue) continue;
       if (s.radius <= 0 || skipped(i)) continue;
-      const Vec3 in_body = local(m, s, body.opening);
-      const Vec3 p = transform(body.pose, in_body);
+      const Vec3 in_body = a.in_body[i], p = a.at_here[i];
       if (holds_tissue && s.jaw != 0 && distance(p, jaws) < 6e-3f) {
         body.skip |= bit(i);
         continue;
@@ -267,26 +312,24 @@ void find_body_contacts(const BodiesModel& model, const wall::Model& wm, const w
       }
     }
     // A sharp edge of the wall between two spheres.
-    k.near_rim.clear();
-    for (const uint32_t f : k.near)
-      if (surface.first_of_face[f] < surface.first_of_face[f + 1] && surface.patch[surface.first_of_face[f + 1] - 1].side == 0)
-        k.near_rim.push_back(f);
     for (uint32_t i = 0; i < m.capsule.size(); ++i) {
+      const std::span<const uint32_t> rims = a.rims(a.run[m.capsule[i].a / kRun]);
+      if (rims.empty()) continue;
       const BodySphere &sa = m.sphere[m.capsule[i].a], &sb = m.sphere[m.capsule[i].b];
       if (sa.radius <= 0 || sb.radius <= 0 || skipped(m.capsule[i].a) || skipped(m.capsule[i].b)) continue;
-      const Vec3 la = local(m, sa, body.opening), lb = local(m, sb, body.opening);
-      const Vec3 pa = transform(body.pose, la), pb = transform(body.pose, lb);
+      const Vec3 la = a.in_body[m.capsule[i].a], lb = a.in_body[m.capsule[i].b];
+      const Vec3 pa = a.at_here[m.capsule[i].a], pb = a.at_here[m.capsule[i].b];
       if (holds_tissue && sa.jaw != 0 && distance((pa + pb) * 0.5f, jaws) < 6e-3f) continue;
       const uint64_t inside = has_jaws ? before & (bit(m.capsule[i].a) | bit(m.capsule[i].b)) : 0;
       const Vec3 middle = (pa + pb) * 0.5f;
       const float reach = 0.5f * distance(pa, pb) + std::max(sa.radius, sb.radius) + margin;
-      for (const uint32_t f : k.near_rim) {
+      for (const uint32_t f : rims) {
+        const BodiesScratch::Ball& ball = ball_of(wm, ws, k, f);
+        const float r = ball.radius + reach;
+        if (length2(ball.center - middle) > r * r) continue;
         const uint32_t last = surface.first_of_face[f + 1];
         uint32_t strip = surface.first_of_face[f];
-        while (strip < last && surface.patch[strip].side != 0) ++strip;
-        if (strip == last) continue;
-        const float r = k.ball[f].radius + reach;
-        if (length2(k.ball[f].center - middle) > r * r) continue;
+        while (surface.patch[strip].side != 0) ++strip;
         for (uint32_t q = strip; q < last; ++q) {
           if (least_distance(wm, ws, surface, search, box_here(f), q, middle) > 1.001f * reach ||
               least_of_part(surface, search, q, middle) > 1.001f * reach)

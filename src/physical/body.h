@@ -157,6 +157,8 @@ struct Bodies {
   uint32_t overflow = 0;
 };
 
+constexpr uint32_t kRun = 8;  // spheres of a body that are searched together
+
 struct BodiesScratch {
   std::vector<Row> row;
   wall::Inverse inverse{512};
@@ -172,19 +174,33 @@ struct BodiesScratch {
   };
   std::vector<Ball> ball;
   uint64_t ball_step = 0;
-  std::vector<uint32_t> near, near_rim;  // elements near a body; those of them that have strips
-  std::vector<uint32_t> near_run;        // elements near a run of its spheres
-  // Elements within some millimeters of a body. A list is kept until body and wall may have come nearer by that much.
+  std::vector<uint32_t> near_run;  // elements near a run of spheres in this step
+  // Elements within some millimeters of a body, and of each run of its spheres. The lists are kept until body and wall may have
+  // come nearer by that much.
+  struct Run {
+    Vec3 center_here, center;           // [m] of a ball about the run and its capsules: in this step, in that of the list
+    float radius_here = 0, radius = 0;  // [m]
+    uint32_t face_first = 0, face_end = 0, rim_first = 0, rim_end = 0;  // its part of Around::run_face and run_rim
+  };
   struct Around {
-    Pose pose;  // of the body, with its box
+    Pose pose;  // of the body, with its box and its spheres
     float opening = 0;
-    Vec3 low_here, high_here;  // [m]
-    Vec3 low, high;            // [m] of the body when the list was made
-    float margin = 0;          // [m]
-    double moved = 0;          // SurfaceSearch::moved
+    Vec3 low_here, high_here;            // [m]
+    std::vector<Vec3> in_body, at_here;  // [m] centers of the spheres
+    float farthest = 0, lever = 0;       // [m] from its center to its surface, and from the hinge to the jaws' spheres; at most
+    float margin = 0;                    // [m]
+    double moved = 0;                    // SurfaceSearch::moved
     uint32_t version = 0;
     bool made = false;
     std::vector<uint32_t> face;
+    std::vector<Run> run;
+    std::vector<uint32_t> run_face, run_rim;  // elements of each run in turn; those of them that have strips
+    std::span<const uint32_t> faces(const Run& r) const {
+      return std::span(run_face).subspan(r.face_first, r.face_end - r.face_first);
+    }
+    std::span<const uint32_t> rims(const Run& r) const {
+      return std::span(run_rim).subspan(r.rim_first, r.rim_end - r.rim_first);
+    }
   };
   std::vector<Around> around;
   struct Moving {

@@ -136,15 +136,17 @@ void keep_before_other_side(const Model& m, State& s, const Scratch& k, uint32_t
     mover.move(node, clamped((other.facing - along * off) * (out / (1 - along * along)), kFarthestOut));
 }
 
-// The nearest place of the wall to a sphere of a tool, among the faces near that; no patch: none within reach.
-Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uint32_t body, Vec3 p, float reach) {
+// The nearest place of the wall to a sphere of a tool, among the faces near its run; no patch: none within reach. moved [m]: by
+// the wall, at most, since the balls round its faces were made.
+Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uint32_t body, uint32_t sphere, Vec3 p,
+                     float reach, float moved) {
   const Surface& surface = surface_of(m, s);
-  constexpr float kMoved = 2e-3f;  // [m] by a face, at most, since its center was noted
   Foot best;
   best.patch = wall::kNone;
   float far = reach;
-  for (const uint32_t f : k.around[body].face) {
-    const float far_off = k.ball[f].radius + reach + kMoved;
+  const BodiesScratch::Around& around = k.around[body];
+  for (const uint32_t f : around.faces(around.run[sphere / kRun])) {
+    const float far_off = 1.001f * (k.ball[f].radius + reach + moved);
     if (length2(k.ball[f].center - p) > far_off * far_off) continue;
     for (uint32_t q = surface.first_of_face[f]; q < surface.first_of_face[f + 1]; ++q) {
       const Foot foot = nearest_on_patch(m.wall, s.wall, surface, q, p);
@@ -161,6 +163,7 @@ Foot nearest_of_near(const Model& m, const State& s, const BodiesScratch& k, uin
 }  // namespace
 
 void put_tools_out(const Model& m, State& s, const Scratch& k) {
+  const float wall_moved = moved_since(s.wall, k.search);
   for (uint32_t b = 0; b < s.bodies.body.size(); ++b) {
     const BodyModel& tool = m.bodies.body[b];
     Body& body = s.bodies.body[b];
@@ -171,7 +174,7 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
         const BodySphere& sphere = tool.sphere[i];
         if (sphere.radius <= kToolLands || (i < 64 && body.skip >> i & 1)) continue;
         const Vec3 at = transform(body.pose, local(tool, sphere, body.opening));
-        const Foot foot = nearest_of_near(m, s, k.bodies, b, at, sphere.radius - kToolLands);
+        const Foot foot = nearest_of_near(m, s, k.bodies, b, i, at, sphere.radius - kToolLands, wall_moved);
         if (foot.patch == wall::kNone || foot.gap <= 0) continue;
         // Half of it in each round: between two walls, and with a wall between its jaws, it comes to lie in the middle.
         body.pose.p += foot.normal * std::min(0.5f * (sphere.radius - kToolLands - foot.gap), kFarthestOut);
@@ -183,7 +186,7 @@ void put_tools_out(const Model& m, State& s, const Scratch& k) {
       const BodySphere& sphere = tool.sphere[i];
       if (sphere.jaw == 0 || sphere.radius <= kOverLands || (i < 64 && body.skip >> i & 1)) continue;
       const Vec3 at = transform(body.pose, local(tool, sphere, body.opening));
-      const Foot foot = nearest_of_near(m, s, k.bodies, b, at, sphere.radius - kOverLands);
+      const Foot foot = nearest_of_near(m, s, k.bodies, b, i, at, sphere.radius - kOverLands, wall_moved);
       if (foot.patch != wall::kNone && foot.gap > 0) deepest = std::max(deepest, sphere.radius - kOverLands - foot.gap);
     }
     if (deepest > 0 && body.opening > kClosed)

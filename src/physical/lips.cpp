@@ -51,39 +51,60 @@ bool is_behind(const wall::Model& m, const wall::State& s, const Surface& surfac
 }
 
 // The nearest point of another part of the wall, on these faces; a gap of 1e9 if there is none. known: the patch that had it in
-// the last step, or kNone. speed: of the lip [m/s]. reach [m]: how far it is sought, beside their motion. nearest_box [m]:
-// becomes the least distance to a face.
+// the last step, or kNone. speed: of the lip [m/s]. reach [m]: how far it is sought, beside their motion. bound: of the last
+// search, becomes that of this one; the patches that are not on these faces are not nearer than `beyond` [m].
 Foot find_foot(const wall::Model& m, const wall::State& s, const Surface& surface, SurfaceSearch& search,
-               std::span<const uint32_t> faces, const Lip& lip, float speed, float reach, uint32_t known, float& nearest_box) {
+               std::span<const uint32_t> faces, const Lip& lip, float speed, float reach, uint32_t known, float beyond,
+               SurfaceSearch::LipBound& bound) {
   Foot best;
   best.gap = 1e9f;
   const auto reach_of = [&](const FaceBox& box) {
     return std::min(std::abs(best.gap), std::max(kDeep, reach + 2 * m.step * (box.speed + speed))) + 1e-6f;
   };
+  // Returns [m] at least: how far the patch is.
   const auto look = [&](const FaceBox& box, uint32_t q) {
-    if (least_distance(m, s, surface, search, box, q, lip.at) > reach_of(box) ||
-        least_of_part(surface, search, q, lip.at) > std::abs(best.gap) + 1e-6f)
-      return;
+    const float far = least_distance(m, s, surface, search, box, q, lip.at);
+    if (far > reach_of(box)) return far;
+    if (const float part = least_of_part(surface, search, q, lip.at); part > std::abs(best.gap) + 1e-6f) return part;
     const Foot foot = nearest_on_patch(m, s, surface, q, lip.at, corners_in(search, q));
-    if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return;
-    if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return;  // whatever was looked at first
-    if (is_other_side(lip, foot)) return;
+    if (foot.gap < -kDeep || std::abs(foot.gap) > std::abs(best.gap)) return far;
+    if (std::abs(foot.gap) == std::abs(best.gap) && q < best.patch) return far;  // whatever was looked at first
+    if (is_other_side(lip, foot)) return far;
     // An edge ends in a sharp border here; a real one is round, and what has come against it still meets it a little beyond.
-    const float beyond = lip.before.empty() ? 0 : kRound;
-    if (foot.gap < 0 && foot.on_edge && length2(cross(lip.at - foot.at, foot.facing)) > beyond * beyond) return;
-    if (is_behind(m, s, surface, lip, foot)) return;
+    const float past = lip.before.empty() ? 0 : kRound;
+    if (foot.gap < 0 && foot.on_edge && length2(cross(lip.at - foot.at, foot.facing)) > past * past) return far;
+    if (is_behind(m, s, surface, lip, foot)) return far;
     best = foot;
+    return far;
   };
-  // Most likely still the nearest: the others need not be searched.
-  if (known != wall::kNone) look(box_of(m, s, search, surface.patch[known].face), known);
+  // Most likely still the nearest: the others need not be searched, and not looked at while they cannot have come nearer.
+  float far_known = 1e9f;
+  if (known != wall::kNone) {
+    far_known = look(box_of(m, s, search, surface.patch[known].face), known);
+    const float of_other = bound.of_other - 2 * static_cast<float>(search.moved - bound.moved);  // both may move
+    if (best.patch == known && best.gap < 1e8f && of_other > std::abs(best.gap) + 2e-6f) {
+      bound = {search.moved, std::min(far_known, of_other), of_other};
+      return best;
+    }
+  }
+  float of_other = beyond;
   for (const uint32_t face : faces) {
     const FaceBox& box = box_of(m, s, search, face);
     const float far = least_distance(box, lip.at, 0);
-    nearest_box = std::min(nearest_box, far);
-    if (far > reach_of(box)) continue;
-    for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q)
-      if (q != known) look(box, q);
+    if (far > reach_of(box)) {
+      of_other = std::min(of_other, far);
+      continue;
+    }
+    for (uint32_t q = surface.first_of_face[face]; q < surface.first_of_face[face + 1]; ++q) {
+      if (q == known) continue;
+      const Foot before = best;
+      const float far_off = look(box, q);
+      // That which was the nearest is another one now.
+      if (best.patch != before.patch || before.gap != best.gap) of_other = std::min(of_other, far_known), far_known = far_off;
+      else of_other = std::min(of_other, far_off);
+    }
   }
+  bound = {search.moved, std::min(far_known, of_other), of_other};
   return best;
 }
 
@@ -177,14 +198,23 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
   auto last = solver.last.begin();  // in the order of keys, as the points below
   for (uint32_t c = 0; c < columns; ++c) {
     if (search.column_first[c] == search.column_first[c + 1] || (!fast && search.moved < search.column_due[c])) continue;
-    float nearest_box = 1e9f;
-    std::span<const uint32_t> faces{&search.column_face[search.column_first[c]],
-                                    search.column_first[c + 1] - search.column_first[c]};
-    if (!fast) faces = close_faces(m, s, surface, search, c, faces, nearest_box);
+    float beyond = 1e9f, nearest = 1e9f;
+    std::span<const uint32_t> faces;
     for (const float zeta : {-1.0f, 0.0f, 1.0f}) {
       if (zeta == 0 && !surface.at_rim[c]) continue;
       const wall::Weights w = wall::at_column(c, zeta);
       const float speed = length(wall::velocity(w, s.motion));
+      SurfaceSearch::LipBound& bound = search.lip_bound[3 * c + static_cast<uint32_t>(zeta + 1)];
+      // Too far to touch anything in this step.
+      const float left = bound.least - 2 * static_cast<float>(search.moved - bound.moved);
+      if (left > solver.reach + 2 * m.step * (speed + search.speed) + 2e-6f) {
+        nearest = std::min(nearest, left);
+        continue;
+      }
+      if (faces.empty()) {
+        faces = {&search.column_face[search.column_first[c]], search.column_first[c + 1] - search.column_first[c]};
+        if (!fast) faces = close_faces(m, s, surface, search, c, faces, beyond);
+      }
       // States saved before grooves have 1 << 62 and other places of the bits: their contacts match none here.
       const uint64_t key = (uint64_t{3} << 62) | (uint64_t{c} << 4) | (static_cast<uint64_t>(zeta + 1) << 2);
       while (last != solver.last.end() && last->key < key) ++last;
@@ -192,7 +222,8 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
       while (after != solver.last.end() && after->key >> 2 == key >> 2) ++after;
       const Lip lip{c, zeta, wall::place(w, s.motion), {last, after}};
       uint32_t& known = search.lip_patch[3 * c + static_cast<uint32_t>(zeta + 1)];
-      const Foot best = find_foot(m, s, surface, search, faces, lip, speed, solver.reach, known, nearest_box);
+      const Foot best = find_foot(m, s, surface, search, faces, lip, speed, solver.reach, known, beyond, bound);
+      nearest = std::min(nearest, bound.least);
       known = best.gap > 1e8f ? wall::kNone : best.patch;
       if (best.gap > 1e8f) continue;
       wall::Contact k;
@@ -216,7 +247,7 @@ void find_lips(const wall::Model& m, const wall::State& s, const Surface& surfac
         solver.contact.push_back(k);
       }
     }
-    search.column_due[c] = search.moved + 0.5 * static_cast<double>(nearest_box - kApart);  // both may move
+    search.column_due[c] = search.moved + 0.5 * static_cast<double>(nearest - kApart);  // both may move
   }
 }
 

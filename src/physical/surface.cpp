@@ -365,8 +365,8 @@ void SurfaceSearch::reserve(const wall::Model& m, const wall::State& s, size_t n
   column_first.reserve(2 * columns + 1), column_face.reserve(64 * columns);
   near.reserve(2 * faces), far.reserve(2 * faces), box.resize(faces);
   group_center.reserve(2 * faces / kGroup), group_radius.reserve(2 * faces / kGroup);
-  lip_patch.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns), node_due.reserve(nodes),
-      node_seen.reserve(nodes), close.reserve(nodes), close_face.reserve(kClose * nodes);
+  lip_patch.reserve(6 * columns), lip_bound.reserve(6 * columns), seen.reserve(2 * columns), column_due.reserve(2 * columns),
+      node_due.reserve(nodes), node_seen.reserve(nodes), close.reserve(nodes), close_face.reserve(kClose * nodes);
   column_close.reserve(2 * columns), column_close_face.reserve(2 * kClose * columns);
 }
 
@@ -385,6 +385,15 @@ CATGUT_CLONES void largest_squares(size_t n, const float* __restrict x, const fl
     }
   for (size_t k = 0; k < 8; ++k) most[k] = change[k], most[8 + k] = speed[k];
 }
+CATGUT_CLONES void largest_changes(size_t n, const float* __restrict x, const float* __restrict seen, float* __restrict most) {
+  float change[8] = {};
+  for (size_t i = 0; i < n; i += 8)
+    for (size_t k = 0; k < 8; ++k) {
+      const float d = x[i + k] - seen[i + k], d2 = d * d;
+      change[k] = d2 > change[k] ? d2 : change[k];
+    }
+  for (size_t k = 0; k < 8; ++k) most[k] = change[k];
+}
 // [m] or [m/s] of any point of the wall, from the largest squares of each coordinate.
 float bound_of(const float* most) {
   return 1.001f * (std::sqrt(most[0] + most[1] + most[2]) + std::sqrt(most[4] + most[5] + most[6]));
@@ -402,6 +411,12 @@ void watch_wall(const wall::State& s, SurfaceSearch& k) {
   float most[16];
   largest_squares(4 * n, &s.motion.x[0].x, &s.motion.v[0].x, &k.seen[0].x, most);
   k.moved += static_cast<double>(bound_of(most)), k.speed = bound_of(most + 8);
+}
+
+float moved_since(const wall::State& s, const SurfaceSearch& k) {
+  float most[8];
+  largest_changes(4 * s.motion.x.size(), &s.motion.x[0].x, &k.seen[0].x, most);
+  return bound_of(most);
 }
 
 const FaceBox& box_of(const wall::Model& m, const wall::State& s, SurfaceSearch& k, uint32_t face) {
@@ -543,7 +558,7 @@ void find_near(const wall::Model& m, const wall::State& s, const Surface& surfac
   k.wall_listed.resize(columns);
   for (uint32_t c = 0; c < columns; ++c) k.wall_listed[c] = mid(s, c);
   k.column_due.assign(columns, 0), k.column_first.clear(), k.column_face.clear();
-  k.lip_patch.assign(3 * columns, wall::kNone);
+  k.lip_patch.assign(3 * columns, wall::kNone), k.lip_bound.assign(3 * columns, {});
   k.column_close.assign(columns, {}), k.column_close_face.resize(kClose * columns);
   const auto rest = [&](uint32_t column) {
     const uint32_t source = s.topology.source[column];

@@ -125,6 +125,12 @@ struct SurfaceSearch {
   std::vector<FaceBox> box;         // per face, made on first use in a step
   std::vector<PatchBox> part;       // per patch, likewise; only of fragments
   std::vector<uint32_t> lip_patch;  // per column and zeta: the nearest patch of the last search, which is looked at first
+  // Per column and zeta, at the last search: at least as far from it were all patches, and all but that nearest one.
+  struct LipBound {
+    double moved = 0;               // then
+    float least = 0, of_other = 0;  // [m]
+  };
+  std::vector<LipBound> lip_bound;
   // What was far from everything is not searched again before the wall may have come near.
   std::vector<wall::Float4> seen;  // the wall in the last step
   double moved = 0;                // [m] the longest path that any point of the wall has traveled so far; only grows
@@ -179,6 +185,8 @@ inline const Vec3* corners_in(const SurfaceSearch& search, uint32_t patch) {
 
 // Once per step, before everything below: how far the wall moves.
 void watch_wall(const wall::State& state, SurfaceSearch& search);
+// [m] At most: by any point of the wall since then.
+float moved_since(const wall::State& state, const SurfaceSearch& search);
 // Once per step, before the searches of that step.
 void find_near(const wall::Model& model, const wall::State& state, const Surface& surface, const thread::State& thread,
                SurfaceSearch& search);
