@@ -10,6 +10,9 @@ namespace {
 
 // [kg] that the thread adds to a swage within a step, at most: more than the stiffness of their spring, times h^2.
 constexpr float kSwageMass = 20e-3f;
+// [kg], [kg m2] that a needle in jaws or tissue weighs more. Between a tool and a wall that weigh ten times as much it needs
+// more sweeps than there are: it shook in its jaws by 20 degrees, and tore its bites.
+constexpr float kHeldMass = 10e-3f, kHeldInertia = 1e-6f;
 constexpr float kCatchUp = 0.2f;  // in a step, of the way from where the thread sees a needle to where it is
 
 // [N] on a segment, of a needle that nothing holds, which weighs 20 mN, and of a tool that comes as near to the drape as
@@ -55,9 +58,11 @@ void start_motion(const BodiesModel& model, const BodyModel& m, const Body& b, c
     if (t) push += t->load * h;
     const float keep = m.falls ? 1 - 2 * h : 1 - 50 * h;
     const float drag = m.falls ? h * out.drag : 0, turn_drag = m.falls ? h * out.turn_drag : 0;
-    out.inv_mass = 1 / (m.mass + drag), out.inv_inertia = 1 / (m.inertia + turn_drag);
-    out.v = (b.velocity * (keep * m.mass) + out.drag_speed * drag + push) * out.inv_mass;
-    out.w = (b.spin * (keep * m.inertia) + out.drag_spin * turn_drag + twist) * out.inv_inertia;
+    const bool stuck = m.falls && !out.loose;
+    const float more = stuck ? kHeldMass : 0, turns = stuck ? kHeldInertia : 0;
+    out.inv_mass = 1 / (m.mass + more + drag), out.inv_inertia = 1 / (m.inertia + turns + turn_drag);
+    out.v = (b.velocity * (keep * m.mass + more) + out.drag_speed * drag + push) * out.inv_mass;
+    out.w = (b.spin * (keep * m.inertia + turns) + out.drag_spin * turn_drag + twist) * out.inv_inertia;
     return;
   }
   const Wish w = wish_of(m, b, *t, h);
