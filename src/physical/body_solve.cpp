@@ -11,7 +11,7 @@ namespace {
 // [kg] that the thread adds to a swage within a step, at most: more than the stiffness of their spring, times h^2.
 constexpr float kSwageMass = 20e-3f;
 // [kg], [kg m2] that a needle in jaws or tissue weighs more. Between a tool and a wall that weigh ten times as much it needs
-// more sweeps than there are: it shook in its jaws by 20 degrees, and tore its bites.
+// more sweeps than there are: it shook in its jaws by 20 degrees.
 constexpr float kHeldMass = 10e-3f, kHeldInertia = 1e-6f;
 constexpr float kCatchUp = 0.2f;  // in a step, of the way from where the thread sees a needle to where it is
 
